@@ -1,0 +1,49 @@
+"""Compare nonlinear solution strategies on equal terms."""
+
+from importlib.metadata import PackageNotFoundError, version
+
+from nlsolve.component import Component
+from nlsolve.discretizers import Discretizer, Operators
+from nlsolve.hookspecs import hookimpl
+from nlsolve.laws import ConstitutiveLaw, PowerForm
+from nlsolve.linear import Factors, LinearSolver
+from nlsolve.problems import Expansion, NonlinearProblem
+from nlsolve.runner import Results, run
+from nlsolve.scenes import Cloud, Exact, Scene
+from nlsolve.series import Series
+from nlsolve.solvers import Evidence, KeptTangent, NonlinearSolver, RefreshRule, Step
+from nlsolve.status import SolveError, Status
+from nlsolve.studies import Study
+
+try:
+    __version__ = version("nlsolve")
+except PackageNotFoundError:  # a checkout on the path, not installed: no plugins either
+    __version__ = "not installed"
+
+__all__ = [
+    "Cloud",
+    "Component",
+    "ConstitutiveLaw",
+    "Discretizer",
+    "Evidence",
+    "Exact",
+    "Expansion",
+    "Factors",
+    "KeptTangent",
+    "LinearSolver",
+    "NonlinearProblem",
+    "NonlinearSolver",
+    "Operators",
+    "PowerForm",
+    "RefreshRule",
+    "Results",
+    "Scene",
+    "Series",
+    "SolveError",
+    "Status",
+    "Step",
+    "Study",
+    "__version__",
+    "hookimpl",
+    "run",
+]

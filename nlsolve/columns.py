@@ -1,0 +1,83 @@
+"""The columns of the result tables, each with its meaning and unit: the one description of what nlsolve measures."""
+
+from __future__ import annotations
+
+RUNS: dict[str, str] = {
+    "case": "identity of the case: a digest of its validated components",
+    "status": "how the case ended, in a word or two",
+    "message": "how the case ended, in a sentence",
+    "nodes": "N, nodes of the cloud",
+    "unknowns": "U, unknown velocity components",
+    "increments": "time steps completed; 1 for a steady state",
+    "time": "time reached [s]",
+    "iterations": "iterations or series used by the method in all increments",
+    "branches": "tangents K* factorised during the march (the 2015 paper's NIM)",
+    "validity_time": "how long the first tangent of the march served [s]",
+    "factorizations": "matrices factorised during the march",
+    "triangular_solves": "pairs of triangular solves during the march",
+    "jacobians": "Jacobians assembled during the march",
+    "residuals": "residuals evaluated by the method during the march",
+    "series_orders": "Taylor coefficients of the residual computed during the march",
+    "start_factorizations": "matrices factorised on the way to the first state",
+    "start_triangular_solves": "pairs of triangular solves on the way to the first state",
+    "start_residuals": "residuals evaluated on the way to the first state",
+    "seconds": "time inside the method: its own work and all it asked for [s]",
+    "seconds_factorization": "of it, factorising [s]",
+    "seconds_triangular_solve": "of it, triangular solves [s]",
+    "seconds_jacobian": "of it, assembling Jacobians [s]",
+    "seconds_residual": "of it, residuals [s]",
+    "seconds_series": "of it, series coefficients [s]",
+    "seconds_operators": "building operators, the same for every method and not in `seconds` [s]",
+    "seconds_start": "reaching the first state [s]",
+    "ordering": "column ordering the linear solver used",
+    "fill": "entries stored in the last factors",
+    "factor_solve_ratio": "measured time of one factorisation over one pair of triangular solves",
+    "residual_norm": "largest relative residual accepted in any increment, asked for outside the method",
+    "velocity_error": "relative ℓ² error of the nodal velocities at the end against the exact solution, where there is one",
+    "torque": "torque of the moving wall on the material per mm of thickness [N mm/mm]",
+    "torque_error": "relative error of the torque against the exact solution",
+    "force_x": "force of the moving wall on the material per mm of thickness, x [N/mm]",
+    "force_y": "the same, y [N/mm]",
+}
+"""`runs`: a row a case, whatever its ending. Behind these stand all parameters of the case, dotted ("solver.order")."""
+
+STEPS: dict[str, str] = {
+    "case": "identity of the case",
+    "increment": "number of the time step; 0 for a steady state",
+    "time": "time at the end of the increment [s]",
+    "step": "number of the step within the increment; 0 is the state the increment began with",
+    "accepted": "true on the last step of a finished increment",
+    "branch": "tangents factorised so far in the march",
+    "triangular_solves": "pairs of triangular solves so far in the march",
+    "residual_norm": "relative residual at the step",
+    "difference": "relative difference from the step before, in the norm of the stopping test",
+    "range": "a_max of the last series computed for the step",
+    "length": "step length of the line search, or the part of the path a series advanced",
+    "contraction": "residual norm over that of the step before, as reported to the refresh rule",
+    "seconds": "time inside the method so far in the march [s]",
+    "probe_x": "place of the probe node, x [mm] (accepted steps)",
+    "probe_y": "the same, y [mm]",
+    "probe_u": "velocity of the probe node, x [mm/s]",
+    "probe_v": "the same, y [mm/s]",
+}
+"""`steps`: a row an iteration or series, in order. A column that does not apply to a method or scene holds NaN."""
+
+FIELDS: dict[str, str] = {
+    "case": "identity of the case",
+    "time": "time of the snapshot [s]",
+    "node": "number of the node",
+    "boundary": "name of the boundary group of the node; empty inside",
+    "x0": "place at t = 0, x [mm]",
+    "y0": "the same, y [mm]",
+    "x": "place, x [mm]",
+    "y": "the same, y [mm]",
+    "u": "velocity, x [mm/s]",
+    "v": "the same, y [mm/s]",
+    "exx": "strain rate ε̇xx [1/s]",
+    "eyy": "strain rate ε̇yy [1/s]",
+    "exy": "strain rate ε̇xy [1/s]",
+    "rate": "equivalent strain rate ε̄ [1/s]",
+    "exact_u": "exact velocity, x [mm/s]; NaN where the scene has none",
+    "exact_v": "the same, y [mm/s]",
+}
+"""`fields`: a row a node and recorded time."""

@@ -1,0 +1,32 @@
+"""Everything a study can name is a `Component`: a frozen, validated value with a `kind`."""
+
+from __future__ import annotations
+
+from typing import Any, ClassVar, Self
+
+from pydantic import BaseModel, ConfigDict
+
+
+class Component(BaseModel):
+    """Base of laws, scenes, discretizers, linear solvers, nonlinear solvers and rules.
+
+    A plugin's class adds `kind: Literal["its-name"] = "its-name"` and its parameters as fields. Instances are frozen;
+    `with_` gives a validated copy. Unknown fields and non-finite numbers are refused.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, validate_default=True)
+
+    noun: ClassVar[str] = "component"
+    """What the contract is called in a study file: "law", "scene", …; set by each contract."""
+
+    def with_(self, **changes: Any) -> Self:
+        """A copy with some fields changed, validated like a new one."""
+        return type(self).model_validate({**self.model_dump(), **changes})
+
+    @classmethod
+    def kind_name(cls) -> str:
+        """The name by which studies ask for this class."""
+        field = cls.model_fields.get("kind")
+        if field is None or not isinstance(field.default, str):
+            raise TypeError(f'{cls.__name__} must declare its name: kind: Literal["name"] = "name"')
+        return field.default

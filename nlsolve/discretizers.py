@@ -1,0 +1,46 @@
+"""R(v) = … − S s(B v) − S_θ λ B_θ v : two pairs of sparse operators, the contract of discretizers.
+
+    B     node velocities -> strain rates at M evaluation points            (3M, 2N)
+    S     stresses there  -> force density at the interior nodes            (2F, 3M)
+    B_θ   node velocities -> dilatation rates at L volume points            (L, 2N)
+    S_θ   pressures there -> force density at the interior nodes            (2F, L)
+
+N nodes, F of them interior. Velocities are node-major (u_0, v_0, u_1, v_1, …); strain rates and stresses are in three
+blocks xx, yy, xy of length M. Evaluation points at the nodes give the composed form, between them stress points.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+from nlsolve.component import Component
+from nlsolve.scenes import Cloud
+from nlsolve.series import Array
+
+
+@dataclass(frozen=True)
+class Operators:
+    """The operators of one cloud. `dilatation` and `pressure_force` are None when no volumetric term was asked for."""
+
+    strain: Any
+    force: Any
+    strain_points: Array
+    dilatation: Any = None
+    pressure_force: Any = None
+    volume_points: Array | None = None
+
+
+class Discretizer(Component, ABC):
+    """Turns a cloud into operators."""
+
+    noun: ClassVar[str] = "discretizer"
+
+    @abstractmethod
+    def operators(self, cloud: Cloud, volumetric: bool) -> Operators:
+        """B, S and, when `volumetric`, B_θ, S_θ. Raises SolveError (bad cloud) naming the place where supports fail."""
+
+    @abstractmethod
+    def values(self, sources: Array, targets: Array) -> Any:
+        """Sparse (T, N) matrix taking values at `sources` (N, 2) to values at `targets` (T, 2)."""

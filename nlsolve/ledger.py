@@ -1,0 +1,152 @@
+"""Counts and times all work a method asks for, outside the method.
+
+A method is handed a view of its problem and of the kept tangent K*. The views offer residuals, Jacobians, expansions and
+solves, each entered here; a Jacobian is handed out sealed, so that it can be multiplied with (counted) and factorised
+(counted) but not read. No attribute of a view leads to the uncounted problem, matrix or factors behind it.
+"""
+
+from __future__ import annotations
+
+import time
+from collections import Counter
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from typing import Any
+from weakref import WeakKeyDictionary
+
+import numpy as np
+
+from nlsolve.linear import Factors, LinearSolver
+from nlsolve.problems import Expansion, NonlinearProblem
+from nlsolve.series import Array
+
+KINDS = ("residual", "jacobian", "matrix_product", "factorization", "triangular_solve", "series_order")
+
+
+@dataclass
+class Ledger:
+    """Counts and seconds by kind of work; the kind "method" holds the time spent inside a method, all included."""
+
+    counts: Counter[str] = field(default_factory=Counter)
+    seconds: Counter[str] = field(default_factory=Counter)
+
+    @contextmanager
+    def entry(self, kind: str) -> Iterator[None]:
+        """Count one piece of work of this kind and the time it takes, even if it fails."""
+        begun = time.perf_counter()
+        try:
+            yield
+        finally:
+            self.seconds[kind] += time.perf_counter() - begun  # type: ignore[assignment]
+            self.counts[kind] += 1
+
+    def each(self, kind: str) -> float:
+        """Mean seconds of one piece of work of this kind; NaN when there was none."""
+        return self.seconds[kind] / self.counts[kind] if self.counts[kind] else float("nan")
+
+
+class SealedMatrix:
+    """A Jacobian as a method sees it: a shape, and products that are counted."""
+
+    def __init__(self, shape: tuple[int, int]) -> None:
+        self.shape = shape
+
+    def __matmul__(self, vector: Array) -> Array:
+        return _contents[self](vector)
+
+
+class _Contents:
+    """What is inside one sealed matrix."""
+
+    def __init__(self, matrix: Any, ledger: Ledger) -> None:
+        self.matrix, self.ledger = matrix, ledger
+
+    def __call__(self, vector: Array) -> Array:
+        with self.ledger.entry("matrix_product"):
+            return self.matrix @ vector
+
+
+_contents: WeakKeyDictionary[SealedMatrix, _Contents] = WeakKeyDictionary()
+
+
+def factorize_counted(linear: LinearSolver, sealed: SealedMatrix, previous: Factors | None, ledger: Ledger) -> Factors:
+    """Open a sealed matrix and factorise what is inside; TypeError for a matrix that no ledger has sealed."""
+    if not isinstance(sealed, SealedMatrix):
+        raise TypeError("only a Jacobian handed out by the problem can be factorised, so that the work is counted")
+    with ledger.entry("factorization"):
+        factors = linear.factorize(_contents[sealed].matrix, previous)
+    ledger.counts["factorization"] += factors.attempts - 1
+    return factors
+
+
+def solve_counted(factors: Factors, sealed: SealedMatrix, rhs: Array, refinement: int, ledger: Ledger) -> Array:
+    """x with A x = rhs, and `refinement` steps x += A⁻¹ (rhs − A x), every triangular solve counted."""
+    with ledger.entry("triangular_solve"):
+        x = factors.solve(rhs)
+    for _ in range(refinement):
+        defect = rhs - sealed @ x
+        with ledger.entry("triangular_solve"):
+            x = x + factors.solve(defect)
+    return x
+
+
+class Audited:
+    """A problem under audit: `view` for the method, `residual` for whoever checks the method, off the clock."""
+
+    def __init__(self, problem: NonlinearProblem, ledger: Ledger) -> None:
+        self._problem = problem
+        self._last: tuple[Array, Array] | None = None
+        self.view = _view(problem, ledger, self._remember)
+
+    def _remember(self, u: Array, residual: Array) -> None:
+        self._last = (u.copy(), residual.copy())
+
+    def residual(self, u: Array) -> Array:
+        """R(u), uncounted; not evaluated again where the method has just evaluated it at this very state."""
+        if self._last is not None and np.array_equal(u, self._last[0]):
+            return self._last[1]
+        return self._problem.residual(u)
+
+
+def _view(problem: NonlinearProblem, ledger: Ledger, remember: Any) -> NonlinearProblem:
+    """The problem as a method sees it. What is behind it lives in these closures, not in attributes."""
+
+    class CountedExpansion(Expansion):
+        def __init__(self, expansion: Expansion) -> None:
+            def coefficient(j: int) -> Array:
+                with ledger.entry("series_order" if j else "residual"):
+                    return expansion.coefficient(j)
+
+            self._coefficient, self._append, self._sum = coefficient, expansion.append, expansion.path
+
+        def coefficient(self, j: int) -> Array:
+            return self._coefficient(j)
+
+        def append(self, coefficient: Array) -> None:
+            self._append(coefficient)
+
+        def path(self, a: float) -> Array:
+            return self._sum(a)
+
+    class CountedProblem(NonlinearProblem):
+        def residual(self, u: Array) -> Array:
+            with ledger.entry("residual"):
+                residual = problem.residual(u)
+            remember(u, residual)
+            return residual
+
+        def jacobian(self, u: Array) -> SealedMatrix:
+            with ledger.entry("jacobian"):
+                matrix = problem.jacobian(u)
+            sealed = SealedMatrix(matrix.shape)
+            _contents[sealed] = _Contents(matrix, ledger)
+            return sealed
+
+        def expand(self, u: Array) -> Expansion:
+            return CountedExpansion(problem.expand(u))
+
+        def scale(self, u: Array) -> float:
+            return problem.scale(u)
+
+    return CountedProblem()

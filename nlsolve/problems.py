@@ -1,0 +1,50 @@
+"""R(u) = 0 : the contract of nonlinear problems, and of their expansion along a path u(a)."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from typing import Any
+
+from nlsolve.series import Array, Series
+
+
+class Expansion:
+    """R(u(a)) = Σ_j a^j R_j along u(a) = u_0 + a u_1 + … : coefficients of the residual, one order at a time.
+
+    Made by running the residual's own formula on a pushed series, so that there is no second formula to keep in step.
+    """
+
+    def __init__(self, path: Series, residual: Series) -> None:
+        self._path, self._residual = path, residual
+
+    def coefficient(self, j: int) -> Array:
+        """R_j, which needs u_0 … u_j."""
+        return self._residual.coefficient(j)
+
+    def append(self, coefficient: Array) -> None:
+        """Push u_j, the next coefficient of the path."""
+        self._path.append(coefficient)
+
+    def path(self, a: float) -> Array:
+        """u(a), summed over the coefficients appended so far."""
+        return self._path.sum(a)
+
+
+class NonlinearProblem(ABC):
+    """R(u) = 0 for u of shape (U,)."""
+
+    @abstractmethod
+    def residual(self, u: Array) -> Array:
+        """R(u), shape (U,)."""
+
+    @abstractmethod
+    def jacobian(self, u: Array) -> Any:
+        """J = ∂R/∂u, a sparse (U, U) matrix."""
+
+    @abstractmethod
+    def expand(self, u: Array) -> Expansion:
+        """The expansion of R around u."""
+
+    def scale(self, u: Array) -> float:
+        """What ‖R‖₂ is compared with to call it small; 1 unless the problem knows the size of what cancels in R."""
+        return 1.0

@@ -1,0 +1,145 @@
+"""Where the material is, what moves it, and which terms the balance of momentum needs: the contract of scenes.
+
+    ρ dV/dt = div σ + f,     σ = λ tr(ε̇) I + S(ε̇)
+
+Inertia, the penalty λ and the motion of nodes are present only when the scene switches them on.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import ClassVar, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
+from scipy.spatial import cKDTree
+
+from nlsolve.component import Component
+from nlsolve.laws import ConstitutiveLaw
+from nlsolve.series import Array
+from nlsolve.status import SolveError, Status
+
+Indices = NDArray[np.intp]
+
+
+@dataclass(frozen=True)
+class Cloud:
+    """Nodes (N, 2) [mm] and the named groups of boundary nodes among them.
+
+    Raises SolveError (bad cloud) when a coordinate is not finite or two nodes coincide.
+    """
+
+    nodes: Array
+    boundaries: Mapping[str, Indices]
+
+    def __post_init__(self) -> None:
+        if not np.isfinite(self.nodes).all():
+            bad = int(np.flatnonzero(~np.isfinite(self.nodes).all(axis=1))[0])
+            raise SolveError(Status.BAD_CLOUD, f"node {bad} has a coordinate that is not a finite number")
+        spread = float(np.ptp(self.nodes, axis=0).max())
+        nearest = self.nearest_distance
+        first = int(nearest.argmin())
+        if not nearest[first] > 1e-9 * spread:
+            x, y = self.nodes[first]
+            raise SolveError(Status.BAD_CLOUD, f"two nodes coincide at ({x:.6g}, {y:.6g}): remove one of them")
+
+    @cached_property
+    def nearest_distance(self) -> Array:
+        """Distance of every node to its nearest neighbour, shape (N,) [mm]."""
+        return cKDTree(self.nodes).query(self.nodes, 2)[0][:, 1]
+
+    @cached_property
+    def on_boundary(self) -> NDArray[np.bool_]:
+        """True for nodes of any boundary group, shape (N,)."""
+        mask = np.zeros(len(self.nodes), dtype=bool)
+        for group in self.boundaries.values():
+            mask[group] = True
+        return mask
+
+    @cached_property
+    def interior(self) -> Indices:
+        """Nodes whose velocity is unknown."""
+        return np.flatnonzero(~self.on_boundary)
+
+    @cached_property
+    def boundary(self) -> Indices:
+        """Nodes whose velocity is prescribed."""
+        return np.flatnonzero(self.on_boundary)
+
+    def moved_to(self, nodes: Array) -> Cloud:
+        """The same groups at other places."""
+        return replace(self, nodes=nodes)
+
+
+@dataclass(frozen=True)
+class Exact:
+    """A closed solution: velocity (N, 2) at points (N, 2), and named quantities such as the torque."""
+
+    velocity: Array
+    quantities: Mapping[str, float] = field(default_factory=dict)
+
+
+class Scene(Component, ABC):
+    """A material, its boundary, its motion and its time.
+
+    With `horizon` None the scene is steady; otherwise it marches from the first state at t = 0 to `horizon` in steps of
+    `increment` (implicit Euler).
+    """
+
+    noun: ClassVar[str] = "scene"
+
+    horizon: float | None = Field(None, gt=0, description="end of the march [s]; absent: one steady state")
+    increment: float = Field(1e-4, gt=0, description="time step of the march [s]")
+    density: float = Field(2.81e-9, gt=0, description="mass density [t/mm³]")
+    inertia: bool = Field(False, description="keep the term ρ (V − V_k)/Δt")
+    penalty: float | None = Field(None, ge=0, description="λ/μ at the reference strain rate; absent: no volumetric term")
+    motion_of_nodes: Literal["fixed", "lagrangian"] = Field("fixed", description="nodes stay, or move with the material")
+    probe: tuple[float, float] | None = Field(None, description="place whose nearest node is recorded in time [mm]")
+
+    @property
+    def increments(self) -> int:
+        """Number of time steps; 0 for a steady scene."""
+        return 0 if self.horizon is None else max(1, round(self.horizon / self.increment))
+
+    @property
+    @abstractmethod
+    def reference_rate(self) -> float:
+        """Strain rate ε̄ [1/s] at which `penalty` and continuation compare viscosities."""
+
+    def penalty_modulus(self, law: ConstitutiveLaw) -> float:
+        """λ = penalty · μ(reference rate) [MPa s]; 0 without a penalty."""
+        if not self.penalty:
+            return 0.0
+        return self.penalty * float(law.viscosity(np.array([self.reference_rate**2]))[0])
+
+    @abstractmethod
+    def cloud(self) -> Cloud:
+        """The nodes at t = 0."""
+
+    @abstractmethod
+    def boundary_position(self, cloud: Cloud, time: float) -> Array:
+        """Where the boundary nodes of the initial `cloud` are at `time`, shape (len(cloud.boundary), 2) [mm]."""
+
+    @abstractmethod
+    def boundary_velocity(self, cloud: Cloud, law: ConstitutiveLaw, time: float) -> Array:
+        """V on the boundary nodes of the (current) `cloud`, shape (len(cloud.boundary), 2) [mm/s]."""
+
+    def body_force(self, points: Array, law: ConstitutiveLaw) -> Array | None:
+        """f at points (N, 2) [N/mm³], or None."""
+        return None
+
+    def exact(self, law: ConstitutiveLaw, points: Array, time: float) -> Exact | None:
+        """The closed quasi-static solution for this law, or None where there is none."""
+        return None
+
+    def inside(self, points: Array, time: float) -> NDArray[np.bool_]:
+        """True where a point (N, 2) lies in the material; used to blank holes in figures."""
+        return np.ones(len(points), dtype=bool)
+
+    def contour(self) -> Array | None:
+        """A closed polygon (C, 2) around the moving wall, in the material, for force and torque; None without one."""
+        return None

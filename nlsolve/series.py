@@ -1,0 +1,287 @@
+"""y(a) = y₀ + a y₁ + a² y₂ + …: truncated power series over arrays, pushed one order at a time.
+
+A `Series` remembers its coefficients and the rule for the next one. Arithmetic on series builds new series whose
+coefficient j is computed when first asked for, from the coefficients 0 … j of its operands, with O(j) array
+operations; p orders of a whole formula therefore cost O(p²). Write a formula once, for arrays, and run it on
+
+    an array            its values,
+    `Series.seed(x)`    its derivative: coefficient 1 of f(x + a) is f′(x),
+    a pushed `Series`   its Taylor coefficients along a path x(a).
+
+Recurrences: Griewank & Walther, Evaluating Derivatives (2008), table 13.2. What is not analytic (absolute value,
+comparison, choice by condition) has no Taylor coefficients and raises TypeError.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from numbers import Number
+from typing import Any, NoReturn
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Array = NDArray[np.float64]
+FIRST_CAPACITY = 24  # coefficients packed arrays have room for at first; doubled whenever they are full
+
+
+class Series:
+    """y(a) = Σ_j a^j y_j with array coefficients y_j, all of one shape.
+
+    `Series(y_0)` starts a series that the caller continues with `append`; arithmetic on it makes dependent series.
+    """
+
+    def __init__(self, start: ArrayLike) -> None:
+        self._rule: Callable[[int], Array] | None = None
+        self._terms = [np.asarray(start, dtype=float)]
+        self._packed = 0
+        self._buffer: Array | None = None
+
+    @classmethod
+    def seed(cls, value: ArrayLike) -> Series:
+        """x + a: coefficient 1 of any formula run on it is the derivative of that formula at `value`."""
+        series = cls(value)
+        series.append(np.ones_like(series.coefficient(0)))
+        return series
+
+    @classmethod
+    def _by_rule(cls, rule: Callable[[int], Array]) -> Series:
+        series = cls(rule(0))
+        series._rule = rule
+        return series
+
+    def append(self, coefficient: ArrayLike) -> None:
+        """Push the next coefficient of a series begun with `Series(y_0)`."""
+        if self._rule is not None:
+            raise TypeError("this series follows from others by a formula: append to the series it was made from")
+        term = np.asarray(coefficient, dtype=float)
+        if term.shape != self.shape:
+            raise ValueError(f"a coefficient of shape {term.shape} in a series of shape {self.shape}")
+        self._terms.append(term)
+
+    def coefficient(self, j: int) -> Array:
+        """y_j, computed now if it was not before; IndexError while the series it depends on is not known to order j."""
+        while len(self._terms) <= j:
+            if self._rule is None:
+                raise IndexError(f"coefficient {j} is not known yet: {len(self._terms)} have been appended so far")
+            self._terms.append(self._rule(len(self._terms)))
+        return self._terms[j]
+
+    def head(self, j: int) -> Array:
+        """y_0 … y_j as one array of shape (j + 1, …); packed only for series that others are convolved with."""
+        self.coefficient(j)
+        if self._buffer is None or j >= len(self._buffer):
+            buffer = np.empty((max(FIRST_CAPACITY, 2 * j), *self.shape))
+            if self._buffer is not None:
+                buffer[: self._packed] = self._buffer[: self._packed]
+            self._buffer = buffer
+        for number in range(self._packed, j + 1):
+            self._buffer[number] = self._terms[number]
+        self._packed = max(self._packed, j + 1)
+        return self._buffer[: j + 1]
+
+    def sum(self, a: float) -> Array:
+        """Σ_j a^j y_j over the coefficients known so far (Horner)."""
+        total = np.zeros(self.shape)
+        for coefficient in reversed(self._terms):
+            total = total * a + coefficient
+        return total
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Shape of one coefficient."""
+        return self._terms[0].shape
+
+    # Linear operations act on every coefficient alike.
+
+    def _linear(self, operation: Callable[[Array], Array]) -> Series:
+        return Series._by_rule(lambda j: operation(self.coefficient(j)))
+
+    def reshape(self, *shape: int) -> Series:
+        """The same numbers in another shape."""
+        return self._linear(lambda y: y.reshape(*shape))
+
+    def __rmatmul__(self, matrix: Any) -> Series:
+        return self._linear(lambda y: matrix @ y)
+
+    def __neg__(self) -> Series:
+        return self._linear(np.negative)
+
+    def __add__(self, other: Any) -> Series:
+        if isinstance(other, Series):
+            return Series._by_rule(lambda j: self.coefficient(j) + other.coefficient(j))
+        constant = _constant(other)
+        shape = np.broadcast_shapes(self.shape, constant.shape)
+        return Series._by_rule(
+            lambda j: self.coefficient(j) + constant if j == 0 else np.broadcast_to(self.coefficient(j), shape)
+        )
+
+    __radd__ = __add__
+
+    def __sub__(self, other: Any) -> Series:
+        return self + (-other)
+
+    def __rsub__(self, other: Any) -> Series:
+        return -self + other
+
+    def __mul__(self, other: Any) -> Series:
+        if isinstance(other, Series):
+            return _product(self, other)
+        constant = _constant(other)
+        return self._linear(lambda y: y * constant)
+
+    __rmul__ = __mul__
+
+    def __truediv__(self, other: Any) -> Series:
+        if isinstance(other, Series):
+            return _quotient(self, other)
+        return self * (1.0 / _constant(other))
+
+    def __rtruediv__(self, other: Any) -> Series:
+        return _quotient(_constant_series(other), self)
+
+    def __pow__(self, exponent: Any) -> Series:
+        if not isinstance(exponent, Number):
+            raise TypeError("a series can be raised to a constant power only; write exp(y log x) for a varying one")
+        if exponent == 2:
+            return _product(self, self)
+        return _power(self, float(exponent))  # type: ignore[arg-type]
+
+    # What has no Taylor coefficients.
+
+    def _refuse(self, *_: Any) -> NoReturn:
+        raise TypeError(
+            "absolute value, comparison and choice by condition are not analytic, so they have no Taylor coefficients: "
+            "write the formula with +, -, *, /, powers, exp, log, sqrt, sinh, asinh and tanh"
+        )
+
+    __abs__ = __lt__ = __le__ = __gt__ = __ge__ = __bool__ = __float__ = _refuse
+    __eq__ = __ne__ = _refuse  # type: ignore[assignment]
+    __hash__ = object.__hash__  # type: ignore[assignment]
+
+    def __array_ufunc__(self, ufunc: np.ufunc, method: str, *inputs: Any, **options: Any) -> Series:
+        formula = _FORMULAS.get(ufunc)
+        if formula is None or method != "__call__" or options:
+            self._refuse()
+        return formula(*inputs)
+
+    def __array_function__(self, function: Callable[..., Any], *_: Any) -> NoReturn:
+        self._refuse()
+
+
+def _constant(value: Any) -> Array:
+    return np.asarray(value, dtype=float)
+
+
+def _constant_series(value: Any) -> Series:
+    start = _constant(value)
+    return Series._by_rule(lambda j: start if j == 0 else np.zeros_like(start))
+
+
+def _convolve(x: Array, y: Array) -> Array:
+    """Σ_l x_l y_{j−l} over the whole of two heads of equal length."""
+    return np.einsum("l...,l...->...", x, y[::-1])
+
+
+def _derivative_convolve(x: Series, y: Series, j: int) -> Array:
+    """(1/j) Σ_{l=1..j} l x_l y_{j−l}: coefficient j of the integral of x′ y."""
+    slope = x.head(j)[1:]
+    weights = np.arange(1.0, j + 1.0).reshape(-1, *[1] * (slope.ndim - 1)) / j
+    return _convolve(weights * slope, y.head(j - 1))
+
+
+def _product(x: Series, y: Series) -> Series:
+    if x is not y:
+        return Series._by_rule(lambda j: _convolve(x.head(j), y.head(j)))
+
+    def square(j: int) -> Array:
+        half = (j + 1) // 2  # x_l x_{j−l} appears twice, but for the middle term of an even order
+        head = x.head(j)
+        total = 2.0 * np.einsum("l...,l...->...", head[:half], head[::-1][:half])
+        return total if j % 2 else total + head[half] ** 2
+
+    return Series._by_rule(square)
+
+
+def _quotient(x: Series, y: Series) -> Series:
+    def rule(j: int) -> Array:
+        if j == 0:
+            return x.coefficient(0) / y.coefficient(0)
+        return (x.coefficient(j) - _convolve(y.head(j)[1:], q.head(j - 1))) / y.coefficient(0)
+
+    q = Series._by_rule(rule)
+    return q
+
+
+def _power(x: Series, exponent: float) -> Series:
+    """j x₀ y_j = Σ_{l=1..j} (α l − (j − l)) x_l y_{j−l} for y = x^α."""
+
+    def rule(j: int) -> Array:
+        if j == 0:
+            return x.coefficient(0) ** exponent
+        slope = x.head(j)[1:]
+        weights = ((exponent + 1.0) / j * np.arange(1.0, j + 1.0) - 1.0).reshape(-1, *[1] * (slope.ndim - 1))
+        return _convolve(weights * slope, y.head(j - 1)) / x.coefficient(0)
+
+    y = Series._by_rule(rule)
+    return y
+
+
+def _from_slope(function: np.ufunc, x: Series, slope_of: Callable[[Series], Series]) -> Series:
+    """y = f(x) through y′ = g x′, where g is a series made from y itself."""
+
+    def rule(j: int) -> Array:
+        return function(x.coefficient(0)) if j == 0 else _derivative_convolve(x, slope_of_y, j)
+
+    y = Series._by_rule(rule)
+    slope_of_y = slope_of(y)
+    return y
+
+
+def _from_inverse_slope(function: np.ufunc, x: Series, g: Series) -> Series:
+    """y = f(x) through g y′ = x′:  g₀ y_j = x_j − (1/j) Σ_{l=1..j−1} l y_l g_{j−l}."""
+
+    def rule(j: int) -> Array:
+        if j == 0:
+            return function(x.coefficient(0))
+        rest = x.coefficient(j)
+        if j > 1:
+            slope = y.head(j - 1)[1:]
+            weights = np.arange(1.0, float(j)).reshape(-1, *[1] * (slope.ndim - 1)) / j
+            rest = rest - _convolve(weights * slope, g.head(j - 1)[1:])
+        return rest / g.coefficient(0)
+
+    y = Series._by_rule(rule)
+    return y
+
+
+def _hyperbolic(x: Series) -> tuple[Series, Series]:
+    """sinh x and cosh x, each the other's slope."""
+
+    def sine(j: int) -> Array:
+        return np.sinh(x.coefficient(0)) if j == 0 else _derivative_convolve(x, cosh, j)
+
+    def cosine(j: int) -> Array:
+        return np.cosh(x.coefficient(0)) if j == 0 else _derivative_convolve(x, sinh, j)
+
+    sinh, cosh = Series._by_rule(sine), Series._by_rule(cosine)
+    return sinh, cosh
+
+
+_FORMULAS: dict[np.ufunc, Callable[..., Series]] = {
+    np.add: lambda x, y: x + y if isinstance(x, Series) else y + x,
+    np.subtract: lambda x, y: x - y if isinstance(x, Series) else -y + x,
+    np.multiply: lambda x, y: x * y if isinstance(x, Series) else y * x,
+    np.divide: lambda x, y: x / y if isinstance(x, Series) else y.__rtruediv__(x),
+    np.matmul: lambda matrix, x: x.__rmatmul__(matrix),
+    np.negative: lambda x: -x,
+    np.square: lambda x: x * x,
+    np.power: lambda x, exponent: Series.__pow__(x, exponent),
+    np.sqrt: lambda x: _power(x, 0.5),
+    np.exp: lambda x: _from_slope(np.exp, x, lambda y: y),
+    np.log: lambda x: _from_inverse_slope(np.log, x, x),
+    np.sinh: lambda x: _hyperbolic(x)[0],
+    np.cosh: lambda x: _hyperbolic(x)[1],
+    np.tanh: lambda x: _from_slope(np.tanh, x, lambda y: 1.0 - y * y),
+    np.arcsinh: lambda x: _from_inverse_slope(np.arcsinh, x, np.sqrt(1.0 + x * x)),
+}

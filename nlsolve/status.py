@@ -1,0 +1,37 @@
+"""How a solve ended. Every ending is a value, and its sentence is what a reader of the table is told."""
+
+from __future__ import annotations
+
+from enum import Enum
+
+
+class Status(Enum):
+    """The ending of one solve, of one march, or of one case."""
+
+    CONVERGED = "the stopping test was met"
+    BUDGET_SPENT = "the iterations allowed were used up before the stopping test was met"
+    STAGNATED = "the residual stopped falling well above the tolerance"
+    DIVERGED = "the residual grew far beyond its first value"
+    NON_FINITE = "a residual, a coefficient or an iterate was not a finite number"
+    SINGULAR_TANGENT = "a tangent could not be factorised: it is singular to working precision"
+    RANGE_EXHAUSTED = "the range of the series fell to nothing before the end of the path"
+    BAD_CLOUD = "the nodes no longer carry a discretisation: coincident nodes or supports without enough neighbours"
+    CRASHED = "the case stopped on an error in the program or in a plugin"
+
+    @property
+    def word(self) -> str:
+        """The short name used in the `status` column."""
+        return self.name.lower().replace("_", " ")
+
+    @property
+    def sentence(self) -> str:
+        """What happened, in a sentence."""
+        return self.value
+
+
+class SolveError(Exception):
+    """An ending discovered deep inside a computation; the driver turns it into a status, never the user's traceback."""
+
+    def __init__(self, status: Status, detail: str = "") -> None:
+        super().__init__(detail or status.sentence)
+        self.status, self.detail = status, detail

@@ -1,0 +1,272 @@
+"""Study file -> validated `Study` -> cases: a question, components by kind, sweeps, and what to show of the results."""
+
+from __future__ import annotations
+
+import hashlib
+import itertools
+import json
+import re
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import Annotated, Any
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, create_model
+
+from nlsolve.columns import RUNS
+from nlsolve.driver import Budget, StoppingTest
+from nlsolve.errors import Problem, Source, StudyError, did_you_mean, problems_in
+from nlsolve.figures import FigureSpec
+from nlsolve.locate import lines_of
+from nlsolve.march import Setup, Start
+from nlsolve.registry import CONTRACTS, Registry, load_registry
+from nlsolve.sweeps import Document, Sweep, assign_all, leaves, merged, places_of, swept_places
+from nlsolve.tables import TableSpec, check
+
+SECTIONS = tuple(field.name for field in fields(Setup))
+"""The parts of a study that a case is made of, and that can be swept."""
+
+DEFAULT_KINDS = {"linear": {"kind": "superlu"}, "starter": {"kind": "newton"}}
+"""Sections that may be left out, or written without a kind."""
+
+DIGEST_LETTERS = 12
+
+
+class Frame(BaseModel):
+    """The parts of a study file around its components."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    question: str = Field(min_length=1, description="what the study finds out, in a sentence")
+    sweep: tuple[Sweep, ...] = ()
+    table: tuple[TableSpec, ...] = ()
+    figure: tuple[FigureSpec, ...] = ()
+    quick: dict[str, Any] = Field(default_factory=dict, description="what --quick changes")
+
+
+@dataclass(frozen=True)
+class Case:
+    """One setup to be run.
+
+    id : digest of the validated components.
+    parameters : every parameter under its dotted name ("solver.order"); lists as JSON text.
+    swept : the names among them that the study sweeps.
+    """
+
+    id: str
+    setup: Setup
+    parameters: Mapping[str, Any]
+    swept: tuple[str, ...]
+
+    @property
+    def label(self) -> str:
+        """The swept parameters, for people."""
+        return ", ".join(f"{name} = {self.parameters[name]}" for name in self.swept) or "the only case"
+
+
+@dataclass(frozen=True)
+class Study:
+    """A question, the cases that answer it, and the tables and figures to show."""
+
+    name: str
+    question: str
+    cases: tuple[Case, ...]
+    tables: tuple[TableSpec, ...] = ()
+    figures: tuple[Any, ...] = ()
+    has_quick: bool = False
+
+    @classmethod
+    def from_toml(
+        cls,
+        path: str | Path,
+        overrides: Mapping[str, Any] | None = None,
+        quick: bool = False,
+        registry: Registry | None = None,
+    ) -> Study:
+        """The study in a file. `overrides` are dotted names and values; `quick` applies the file's [quick] first."""
+        try:
+            text = Path(path).read_text(encoding="utf-8")
+            document = tomllib.loads(text)
+        except OSError as error:
+            raise StudyError(f"{path}: the study cannot be read: {error.strerror}") from error
+        except UnicodeDecodeError as error:
+            raise StudyError(f"{path}: the study is not UTF-8 text: {error.reason}") from error
+        except tomllib.TOMLDecodeError as error:
+            raise StudyError(_syntax(str(path), str(error))) from error
+        source = Source(str(path), lines_of(text))
+        return _Builder(source, document, overrides or {}, quick, registry or load_registry()).study(Path(path).stem)
+
+    @classmethod
+    def from_dict(
+        cls,
+        document: Mapping[str, Any],
+        overrides: Mapping[str, Any] | None = None,
+        quick: bool = False,
+        registry: Registry | None = None,
+        name: str = "study",
+    ) -> Study:
+        """The same from Python; sections may be components."""
+        return _Builder(Source(name), document, overrides or {}, quick, registry or load_registry()).study(name)
+
+
+class _Builder:
+    """One study on its way from a document to cases, with all that an error message wants to tell."""
+
+    def __init__(
+        self, source: Source, document: Mapping[str, Any], overrides: Mapping[str, Any], quick: bool, registry: Registry
+    ) -> None:
+        self.registry = registry
+        self.document: Document = merged({}, document)
+        aliases = {name: source.at(place) for name, place in swept_places(self.document).items()}
+        quick_values: Document = {}
+        if quick:
+            if not isinstance(self.document.get("quick"), dict):
+                raise StudyError(f"{source.file}: the study has no [quick] section, so it cannot be run with --quick")
+            quick_values = self.document["quick"]
+            changed = swept_places(quick_values) | places_of(quick_values)
+            aliases |= {name: source.at(("quick", *place)) for name, place in changed.items()}
+        self.quick = quick
+        self.overrides = {**quick_values, **overrides}
+        self.source = Source(source.file, source.lines, aliases | {name: f"{source.file}, --set" for name in overrides})
+        self.refuse(assign_all(self.document, self.overrides))
+        parts: dict[str, Any] = {noun: (registry.union(noun), ...) for noun in CONTRACTS} | {
+            "refresh": (registry.union("refresh"), None),  # absent only when there is no solver to ask for its default
+            "starter": (registry.union("solver"), ...),
+            "stop": (StoppingTest, StoppingTest()),
+            "start": (Start, Start()),
+            "budget": (Budget, Budget()),
+            "record": (tuple[Annotated[float, Field(ge=0, allow_inf_nan=False)], ...], ()),
+        }
+        self.model = create_model("Composition", __config__=ConfigDict(extra="forbid", frozen=True), **parts)
+
+    def study(self, name: str) -> Study:
+        frame = self.frame()
+        cases = self.cases(frame)
+        tables, problems = [], []
+        for number, spec in enumerate(frame.table):
+            found = check(spec, [case.parameters for case in cases])
+            if self.quick or (self.overrides and any(problem.place[0] == "paper" for problem in found)):
+                spec = spec.with_(paper=None)  # the study is no longer the one the paper's values are for
+                found = check(spec, [case.parameters for case in cases])
+            tables.append(spec)
+            problems += [Problem(("table", number, *wrong.place), wrong.value, wrong.expected) for wrong in found]
+        known = list(dict.fromkeys([*RUNS, *(name for case in cases for name in case.parameters)]))
+        problems += [
+            Problem(("figure", number, field), column, f"no such column of the results; {did_you_mean(column, known)}")
+            for number, figure in enumerate(frame.figure)
+            for field in ("where", "group")
+            for column in getattr(figure, field)
+            if column not in known
+        ]
+        self.refuse(problems)
+        return Study(name, frame.question, cases, tuple(tables), frame.figure, bool(frame.quick))
+
+    def refuse(self, problems: list[Problem]) -> None:
+        if problems:
+            raise StudyError(*dict.fromkeys(problem.sentence(self.source) for problem in problems))
+
+    def frame(self) -> Frame:
+        document = {name: value for name, value in self.document.items() if name not in SECTIONS}
+        unknown = [name for name in document if name not in Frame.model_fields]
+        names = [*Frame.model_fields, *SECTIONS]
+        self.refuse(
+            [Problem((name,), self.document[name], f"no such section; {did_you_mean(name, names)}") for name in unknown]
+        )
+        try:
+            frame = Frame.model_validate(document)
+        except ValidationError as error:
+            self.refuse(problems_in(error, Frame, document))
+            raise
+        swept = [name for sweep in frame.sweep for name in sweep.columns]
+        self.refuse(
+            [Problem((name,), [], "swept twice") for name in swept if swept.count(name) > 1]
+            + [
+                Problem((name,), [], f"not a parameter; {did_you_mean(name.split('.')[0], SECTIONS)}")
+                for name in swept
+                if name.split(".")[0] not in SECTIONS
+            ]
+        )
+        return frame
+
+    def cases(self, frame: Frame) -> tuple[Case, ...]:
+        cases: dict[str, Case] = {}
+        problems: list[Problem] = []
+        base = {name: value for name, value in self.document.items() if name in SECTIONS}
+        for points in itertools.product(*(sweep.assignments() for sweep in frame.sweep)):
+            assigned = {name: value for point in points for name, value in point.items()}
+            document = merged({}, base)
+            sections_first = dict(sorted(assigned.items(), key=lambda item: item[0].count(".")))
+            by_hand = {name: value for name, value in self.overrides.items() if name.split(".")[0] in SECTIONS}
+            wrong = assign_all(document, sections_first) + assign_all(document, by_hand)  # the hand wins
+            if wrong:
+                problems += wrong
+                continue
+            try:
+                case = self.case(document, tuple(assigned))
+            except _Refused as refused:
+                problems += refused.problems
+            else:
+                cases.setdefault(case.id, case)  # what is set by hand may make two cases one
+        self.refuse(problems)
+        return tuple(cases.values())
+
+    def case(self, document: Document, swept: tuple[str, ...]) -> Case:
+        """Validate one combination. Raises _Refused."""
+        for section, default in DEFAULT_KINDS.items():
+            self.complete(document, section, default)
+        solver = document.get("solver")
+        kind = solver.get("kind") if isinstance(solver, dict) else None
+        cls = self.registry.classes("solver").get(kind) if isinstance(kind, str) else None
+        if cls is not None:
+            self.complete(document, "refresh", cls.default_refresh)  # type: ignore[attr-defined]
+        try:
+            composition = self.model.model_validate(document)
+        except ValidationError as error:
+            raise _Refused(problems_in(error, self.model, document)) from error
+        setup = Setup(**{name: getattr(composition, name) for name in SECTIONS})
+        if setup.stop.kind == "claim" and not setup.solver.claims:
+            sentence = f"the solver {setup.solver.kind_name()!r} never claims a solution; use residual or difference"
+            raise _Refused([Problem(("stop", "kind"), "claim", sentence)])
+        try:
+            setup.law.continuation(setup.start.by, setup.start.values)
+        except ValidationError as error:
+            reasons = "; ".join(detail["msg"] for detail in error.errors())
+            raise _Refused(
+                [Problem(("start", "values"), list(setup.start.values), f"refused by the law: {reasons}")]
+            ) from error
+        except ValueError as error:
+            reason = str(error).removeprefix(f"start.by = {setup.start.by!r}: ")
+            raise _Refused([Problem(("start", "by"), setup.start.by, reason)]) from error
+        plain = json.loads(composition.model_dump_json())
+        canonical = json.dumps(plain, sort_keys=True, separators=(",", ":"))
+        digest = hashlib.sha256(canonical.encode()).hexdigest()[:DIGEST_LETTERS]
+        parameters = {
+            name: json.dumps(value) if isinstance(value, list | dict) else value for name, value in leaves(plain)
+        }
+        names = tuple(
+            parameter
+            for parameter in parameters
+            if any(parameter == name or parameter.startswith(f"{name}.") for name in swept)
+        )
+        return Case(digest, setup, parameters, names)
+
+    def complete(self, document: Document, section: str, default: Mapping[str, Any]) -> None:
+        """Give a section that names no kind its default."""
+        given = document.get(section, {})
+        if isinstance(given, dict) and "kind" not in given:
+            document[section] = {**default, **given}
+
+
+class _Refused(Exception):
+    """A combination that does not make a case."""
+
+    def __init__(self, problems: list[Problem]) -> None:
+        super().__init__()
+        self.problems = problems
+
+
+def _syntax(path: str, message: str) -> str:
+    found = re.search(r"\(at line (\d+), column (\d+)\)", message)
+    where = f", line {found[1]}, column {found[2]}" if found else ""
+    return f"{path}{where}: not valid TOML: {message.split(' (at ')[0]}"

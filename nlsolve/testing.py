@@ -1,0 +1,246 @@
+"""Every contract ships its check: the conformance kit of nlsolve, for its own plugins and for strangers'.
+
+    def test_my_law() -> None:
+        check_law(MyLaw())
+
+A check takes an instance, runs it through what its contract promises, and raises AssertionError with a sentence that
+says which promise was broken and by how much. The numbers it draws are seeded: a check fails always or never.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+
+from nlsolve.discretizers import Discretizer
+from nlsolve.driver import Budget, StoppingTest, solve
+from nlsolve.laws import ConstitutiveLaw
+from nlsolve.ledger import Ledger
+from nlsolve.linear import LinearSolver
+from nlsolve.problems import NonlinearProblem
+from nlsolve.scenes import Cloud, Scene
+from nlsolve.series import Array, Series
+from nlsolve.small import DenseLU, SmallProblem
+from nlsolve.solvers import Evidence, KeptTangent, NonlinearSolver, RefreshRule, Step
+from nlsolve.status import SolveError, Status
+from nlsolve.tangent import Tangent
+
+ORDER = 4  # of the truncated sums that series are compared with
+PARTS = 0.5 ** np.arange(2, 22)  # steps and path lengths tried; the best of them escapes truncation and rounding both
+
+
+def _require(holds: Any, sentence: str) -> None:
+    if not holds:
+        raise AssertionError(sentence)
+
+
+def _size(value: Any) -> float:
+    return float(np.linalg.norm(np.ravel(value)))
+
+
+def _same(found: Any, expected: Any, scale: float, what: str, tolerance: float = 1e-10) -> None:
+    """Largest difference ≤ tolerance · scale."""
+    off = float(np.max(np.abs(found - expected), initial=0.0))
+    _require(off <= tolerance * scale, f"{what}: off by {off:.2e}, allowed {tolerance:g} of {scale:.2e}")
+
+
+def _check_coefficients(f: Callable[[float], Array], coefficients: list[Array], what: str) -> None:
+    """f(a) = Σ_j a^j f_j: at some small a the first j + 1 terms must leave less than 2 % of the last one."""
+    values = {float(a): f(float(a)) for a in PARTS}
+    for j in range(1, len(coefficients)):
+        size = _size(coefficients[j]) or _size(coefficients[0])
+        left = min(
+            _size(y - sum(a**i * coefficients[i] for i in range(j + 1))) / (a**j * size) for a, y in values.items()
+        )
+        _require(left <= 0.02, f"{what}: coefficient {j} misses {left:.1%} of what it should be")
+
+
+def check_law(law: ConstitutiveLaw, rates: Iterable[float] = tuple(10.0 ** np.arange(-1.0, 4.5, 0.5))) -> None:
+    """μ(ε̄²) at the given ε̄ [1/s]: positive and finite; its derivative by seed against central differences to 1e-7; its
+    Taylor coefficients along a path ε̄²(a) against μ on that path.
+    """
+    x = np.asarray(tuple(rates)) ** 2
+    mu = np.asarray(law.viscosity(x))
+    _require(mu.shape == x.shape, f"viscosity of shape {mu.shape} for rates of shape {x.shape}")
+    bad = np.sqrt(x[~(np.isfinite(mu) & (mu > 0.0))])
+    _require(not bad.size, f"the viscosity is not a positive finite number at the rates {bad} 1/s")
+    seeded = law.viscosity(Series.seed(x))
+    _require(isinstance(seeded, Series), "the viscosity of a series must be a series: use analytic operations only")
+    _same(seeded.coefficient(0) / mu, 1.0, 1.0, "viscosity on a series over that on an array", 1e-14)
+    slope, small = seeded.coefficient(1), 1e-4 * mu / x  # near a maximum of μ its slope vanishes
+    differences = [(law.viscosity(x * (1 + h)) - law.viscosity(x * (1 - h))) / (2 * h * x) for h in PARTS]
+    off = np.min([np.abs(slope - d) / np.maximum(np.abs(slope), small) for d in differences], axis=0)
+    _require(off.max() <= 1e-7, f"μ′ by seed is off by {off.max():.1e} at {np.sqrt(x[off.argmax()]):.3g} 1/s")
+    path = Series(x)
+    values = law.viscosity(path)
+    for j in range(1, ORDER + 1):
+        path.append(x * np.cos(np.arange(len(x)) + j) / 2.0**j)
+    coefficients = [values.coefficient(j) for j in range(ORDER + 1)]
+    _check_coefficients(lambda a: law.viscosity(path.sum(a)), coefficients, "viscosity")
+
+
+def check_discretizer(discretizer: Discretizer, cloud: Cloud, tolerance: float = 1e-10) -> None:
+    """Shapes, and what a consistent scheme reproduces, to `tolerance` of the sizes summed: no strain of rigid motions,
+    constant strain rate of linear velocities, no force of constant stress or pressure, the divergence of linear stress,
+    linear values.
+    """
+    n, free, extent = len(cloud.nodes), cloud.interior, float(np.ptp(cloud.nodes, axis=0).max())
+    plain, full = discretizer.operators(cloud, False), discretizer.operators(cloud, True)
+    _require(plain.dilatation is None and plain.pressure_force is None, "volumetric operators nobody asked for")
+    _require(full.dilatation is not None and full.volume_points is not None, "no volumetric operators")
+    assert full.volume_points is not None
+    m, count, f = len(full.strain_points), len(full.volume_points), len(free)
+    shapes = {"strain": (3 * m, 2 * n), "force": (2 * f, 3 * m), "strain_points": (m, 2)}
+    volumetric = {"dilatation": (count, 2 * n), "pressure_force": (2 * f, count), "volume_points": (count, 2)}
+    for operators, expected in ((plain, shapes), (full, shapes | volumetric)):
+        for name, shape in expected.items():
+            found = getattr(operators, name).shape
+            _require(found == shape, f"{name} of shape {found}, not {shape}")
+
+    def holds(what: str, matrix: Any, field: Array, expected: Any) -> None:
+        size = float(abs(matrix).sum(axis=1).max() * np.abs(field).max())
+        _same(matrix @ field.ravel(), expected, size, what, tolerance)
+
+    x, points = cloud.nodes - cloud.nodes.mean(axis=0), full.strain_points - cloud.nodes.mean(axis=0)
+    for name, gradient in {
+        "translation": np.zeros((2, 2)),
+        "rotation": np.array([[0.0, -1.0], [1.0, 0.0]]),
+        "linear velocity": np.array([[0.7, -0.3], [1.1, 0.4]]),
+    }.items():
+        velocity = x @ gradient.T + [1.0, -2.0]
+        rate = [gradient[0, 0], gradient[1, 1], 0.5 * (gradient[0, 1] + gradient[1, 0])]
+        holds(f"strain rate of a {name}", full.strain, velocity, np.repeat(rate, m))
+        holds(f"dilatation of a {name}", full.dilatation, velocity, np.trace(gradient))
+    holds("force of a constant stress", full.force, np.repeat([1.0, -2.0, 0.5], m), 0.0)
+    holds("force of a constant pressure", full.pressure_force, np.ones(count), 0.0)
+    slopes = np.array([[0.3, -1.0], [0.8, 0.2], [-0.6, 0.9]])  # of xx, yy, xy along x and y
+    divergence = np.tile([slopes[0, 0] + slopes[2, 1], slopes[2, 0] + slopes[1, 1]], f)
+    holds("force of a linear stress", full.force, slopes @ points.T, divergence)
+    values = discretizer.values(full.strain_points, cloud.nodes[free])
+    _require(values.shape == (f, m), f"values of shape {values.shape}, not {(f, m)}")
+    holds("values of a linear field", values, extent + points @ [2.0, -3.0], extent + x[free] @ [2.0, -3.0])
+
+
+def check_scene(scene: Scene, law: ConstitutiveLaw) -> None:
+    """A cloud with an inside and boundary groups that share no node; boundary nodes that start where they are; shapes;
+    an exact velocity, where there is one, that agrees with the prescribed one.
+    """
+    cloud = scene.cloud()  # raises for coincident nodes
+    members = np.concatenate([np.asarray(group) for group in cloud.boundaries.values()])
+    _require(len(np.unique(members)) == len(members), "a node belongs to two boundary groups")
+    _require(((members >= 0) & (members < len(cloud.nodes))).all(), "a boundary group names a node that does not exist")
+    _require(len(cloud.interior), "no node lies inside")
+    held = cloud.nodes[cloud.boundary]
+    _same(scene.boundary_position(cloud, 0.0), held, float(np.ptp(cloud.nodes)), "boundary_position at t = 0", 1e-14)
+    velocity = scene.boundary_velocity(cloud, law, 0.0)
+    _require(velocity.shape == held.shape, f"boundary_velocity of shape {velocity.shape}, not {held.shape}")
+    _require(np.isfinite(velocity).all(), "boundary_velocity is not finite")
+    _require(
+        np.isfinite(scene.reference_rate) and scene.reference_rate > 0, "reference_rate must be positive and finite"
+    )
+    inside = cloud.nodes[cloud.interior]
+    force = scene.body_force(inside, law)
+    _require(force is None or force.shape == inside.shape, "body_force must have the shape of its points")
+    _require(scene.inside(inside, 0.0).all(), "inside() denies a node of the cloud")
+    contour = scene.contour()
+    _require(contour is None or (contour.ndim == 2 and contour.shape[1] == 2), "contour() must be a polygon (C, 2)")
+    exact = scene.exact(law, cloud.nodes, 0.0)
+    if exact is not None:
+        _require(exact.velocity.shape == cloud.nodes.shape, f"an exact velocity of shape {exact.velocity.shape}")
+        size = float(np.abs(exact.velocity).max())
+        _same(
+            exact.velocity[cloud.boundary], velocity, size, "exact against prescribed velocity on the boundary", 1e-12
+        )
+
+
+def check_linear_solver(linear: LinearSolver) -> None:
+    """A x = b to 1e-10 on a seeded sparse diagonally dominant matrix, with factors lent and not; a named ordering and a
+    fill; a singular matrix ends in SolveError (singular tangent), never in a wrong answer.
+    """
+    random = np.random.default_rng(0)
+    matrix = sp.random_array((60, 60), density=0.1, rng=random, format="csr")
+    matrix = (matrix + sp.diags_array(1.0 + abs(matrix).sum(axis=1))).tocsr()
+    factors = None
+    for _ in range(2):
+        factors = linear.factorize(matrix, factors)
+        rhs = random.standard_normal(60)
+        kept = rhs.copy()
+        _same(matrix @ factors.solve(rhs), kept, 1.0, "A x against b")
+        _require(np.array_equal(rhs, kept), "solve changed its right-hand side")
+        _require(factors.ordering not in ("", "none"), "the ordering of the factors has no name")
+        _require(factors.fill > 0, "fill must tell how many entries the factors hold")
+        _require(factors.attempts >= 1, "attempts must count every factorisation carried out")
+    singular = matrix.toarray()
+    singular[7] = 0.0
+    try:
+        linear.factorize(sp.csr_array(singular))
+    except SolveError as error:
+        _require(error.status is Status.SINGULAR_TANGENT, f"a singular matrix ended as {error.status.word!r}")
+    else:
+        raise AssertionError(
+            "a singular matrix was factorised without a word: raise SolveError(Status.SINGULAR_TANGENT)"
+        )
+
+
+def check_problem(problem: NonlinearProblem, u: Array, tolerance: float = 1e-6) -> None:
+    """J d against central differences of R along random d, to `tolerance`; R_j along a path against R on that path."""
+    random = np.random.default_rng(0)
+    size = _size(u) / np.sqrt(len(u)) or 1.0
+    jacobian = problem.jacobian(u)
+    for _ in range(3):
+        d = random.standard_normal(len(u)) * size
+        product = jacobian @ d
+        steps = [(problem.residual(u + h * d) - problem.residual(u - h * d)) / (2.0 * h) for h in PARTS]
+        off = min(_size(product - difference) for difference in steps) / _size(product)
+        _require(off <= tolerance, f"the Jacobian is off by {off:.1e} from central differences, allowed {tolerance:g}")
+    expansion = problem.expand(u)
+    path = Series(u)
+    for j in range(1, ORDER + 1):
+        path.append(random.standard_normal(len(u)) * size / 4.0**j)
+        expansion.append(path.coefficient(j))
+    _same(expansion.path(0.5), path.sum(0.5), size, "path(a) against the sum of what was appended", 1e-12)
+    coefficients = [expansion.coefficient(j) for j in range(ORDER + 1)]
+    start = problem.residual(u)
+    _same(coefficients[0], start, _size(start) or problem.scale(u), "R_0 against R(u)", 1e-12)
+    _check_coefficients(lambda a: problem.residual(path.sum(a)), coefficients, "residual along a path")
+
+
+def check_refresh_rule(rule: RefreshRule) -> None:
+    """A plain answer to any evidence, the same each time, be it not yet observed (None) or not a number."""
+    for seen in (None, 0.0, 0.5, 1.0, 1e9, np.nan):
+        for evidence in (Evidence(1, seen), Evidence(1, None, seen), Evidence(99, seen, seen)):
+            first, again = rule.due(evidence), rule.due(evidence)
+            _require(isinstance(first, (bool, np.bool_)), f"due({evidence}) is {first!r}, not True or False")
+            _require(first == again, f"due({evidence}) changed its mind: a rule may look at the evidence only")
+
+
+def check_solver(solver: NonlinearSolver, rule: RefreshRule | None = None) -> None:
+    """The start comes first and is left as it was, like every state after it; a small problem is solved to 1e-10 under
+    the driver; what linear solver and problem were asked for is in the ledger.
+    """
+    problem, ledger, asked_before = SmallProblem(), Ledger(), DenseLU.asked.copy()
+    tangent = Tangent(DenseLU(), rule, ledger)
+    start = SmallProblem.solution + 0.5 * np.cos(np.arange(12.0))
+    kept = start.copy()
+    seen: list[tuple[Array, Array]] = []
+
+    class Watched(NonlinearSolver):
+        def steps(self, problem: NonlinearProblem, tangent: KeptTangent, start: Array) -> Iterator[Step]:
+            for step in solver.steps(problem, tangent, start):
+                seen.append((step.state, step.state.copy()))
+                yield step
+
+    outcome = solve(problem, Watched(), tangent, start, StoppingTest(tolerance=1e-11), Budget(), ledger)
+    _require(outcome.status is Status.CONVERGED, f"a small convex problem was not solved: {outcome.detail}")
+    _same(outcome.state, SmallProblem.solution, 1.0, "the solution of the small problem")
+    _require(np.array_equal(seen[0][1], kept), "the first state yielded must be the start itself")
+    _require(np.array_equal(start, kept), "the method changed the array it was given as its start")
+    _require(all(np.array_equal(a, b) for a, b in seen), "the method changed a state after it had yielded it")
+    counts = ledger.counts
+    _require(counts["triangular_solve"] > 0, "the method never used K*: tangent.solve is where its work shows")
+    _require(counts["residual"] + counts["series_order"] > 0, "the method asked for no residual and no coefficient")
+    for kind, asked in (DenseLU.asked - asked_before).items():
+        _require(counts[kind] == asked, f"{asked} of kind {kind} were asked for and {counts[kind]} are in the ledger")

@@ -1,0 +1,14 @@
+"""First-party scenes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from nlsolve import Component, hookimpl
+from nlsolve_scenes.channel import Channel
+from nlsolve_scenes.stirring_tool import StirringTool
+
+
+@hookimpl
+def nlsolve_components() -> Iterable[type[Component]]:
+    return [StirringTool, Channel]

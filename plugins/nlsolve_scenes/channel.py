@@ -1,0 +1,82 @@
+"""Power-law Poiseuille flow between two plates."""
+
+from __future__ import annotations
+
+from typing import Literal, Self
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from nlsolve import Cloud, ConstitutiveLaw, Exact, Scene
+
+
+class Channel(Scene):
+    """|y| ≤ H, 0 ≤ x ≤ L, driven by a uniform force f = (G, 0); walls held, exact velocity imposed at both ends.
+
+    u(y) = n/(n + 1) (G/m)^(1/n) (H^((n+1)/n) − |y|^((n+1)/n)),  τ = −G y, for the pure power law τ = m γ̇ⁿ.
+    """
+
+    kind: Literal["channel"] = "channel"
+    half_height: float = Field(1.0, gt=0, description="H [mm]")
+    length: float = Field(2.0, gt=0, description="L [mm]")
+    mean_speed: float = Field(100.0, gt=0, description="mean velocity of the pure power law, which sets G [mm/s]")
+    spacing: float = Field(0.1, gt=0, description="distance of nodes [mm]")
+    jitter: float = Field(0.0, ge=0, lt=0.5, description="random shift of interior nodes, part of the spacing")
+    seed: int = Field(0, ge=0, description="of the random shifts")
+
+    @model_validator(mode="after")
+    def _steady_on_fixed_nodes(self) -> Self:
+        if self.motion_of_nodes == "lagrangian":
+            raise ValueError('motion_of_nodes = "lagrangian": material leaves the channel, so its nodes stay "fixed"')
+        return self
+
+    @property
+    def reference_rate(self) -> float:
+        """Mean speed over half the height."""
+        return self.mean_speed / self.half_height
+
+    def cloud(self) -> Cloud:
+        """A regular grid, jittered inside; boundary groups "bottom", "top", "inlet", "outlet"."""
+        columns = max(2, round(self.length / self.spacing)) + 1
+        rows = max(2, round(2.0 * self.half_height / self.spacing)) + 1
+        x, y = np.meshgrid(np.linspace(0.0, self.length, columns), np.linspace(-self.half_height, self.half_height, rows))
+        nodes = np.stack([x.ravel(), y.ravel()], axis=1)
+        number = np.arange(rows * columns).reshape(rows, columns)
+        boundaries = {"bottom": number[0], "top": number[-1], "inlet": number[1:-1, 0], "outlet": number[1:-1, -1]}
+        interior = number[1:-1, 1:-1].ravel()
+        shifts = np.random.default_rng(self.seed).uniform(-1.0, 1.0, (len(interior), 2))
+        nodes[interior] += self.jitter * self.spacing * shifts
+        return Cloud(nodes, boundaries)
+
+    def boundary_position(self, cloud: Cloud, time: float) -> np.ndarray:
+        """Where they were."""
+        return cloud.nodes[cloud.boundary]
+
+    def boundary_velocity(self, cloud: Cloud, law: ConstitutiveLaw, time: float) -> np.ndarray:
+        """The exact profile at both ends, zero on the plates."""
+        velocity, _ = self._profile(law, cloud.nodes[cloud.boundary])
+        return velocity
+
+    def body_force(self, points: np.ndarray, law: ConstitutiveLaw) -> np.ndarray:
+        """(G, 0) [N/mm³], with G = m ((2n + 1)/n · mean speed/H)ⁿ / H."""
+        _, gradient = self._profile(law, points)
+        return np.tile([gradient, 0.0], (len(points), 1))
+
+    def exact(self, law: ConstitutiveLaw, points: np.ndarray, time: float) -> Exact | None:
+        """The profile above; None for a law that is no power law."""
+        if law.power_form() is None:
+            return None
+        velocity, gradient = self._profile(law, points)
+        return Exact(velocity, {"pressure_gradient": gradient})
+
+    def _profile(self, law: ConstitutiveLaw, points: np.ndarray) -> tuple[np.ndarray, float]:
+        """Exact velocity (N, 2) and G. Raises ValueError for a law that is no power law."""
+        form = law.power_form()
+        if form is None:
+            raise ValueError(f'scene.kind = "channel" needs a power law for its ends, and {law.kind_name()!r} is none')
+        n, height = form.index, self.half_height
+        # u_max = (2n + 1)/(n + 1) · mean speed, and γ̇ at the wall = (2n + 1)/n · mean speed/H.
+        wall_rate = (2.0 * n + 1.0) / n * self.mean_speed / height
+        relative = np.minimum(np.abs(points[:, 1]) / height, 1.0)
+        speed = (2.0 * n + 1.0) / (n + 1.0) * self.mean_speed * (1.0 - relative ** (1.0 + 1.0 / n))
+        return np.stack([speed, np.zeros_like(speed)], axis=1), form.shear_consistency * wall_rate**n / height

@@ -1,0 +1,97 @@
+"""An annulus of material around a tool that spins or orbits: the scene of the 2015 paper."""
+
+from __future__ import annotations
+
+from typing import Literal, Self
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from nlsolve import Cloud, ConstitutiveLaw, Exact, Scene
+from nlsolve_scenes.rings import RingNodes, Rings, nodes_on_rings
+
+
+class StirringTool(Scene):
+    """r_t ≤ r ≤ r_p, plane strain; the tool's wall moves, the outer wall is held, adhesion is perfect.
+
+    spin : V = ω r_t (−sin θ, cos θ) on the tool. Quasi-static exact solution for the pure power law (incompressible):
+           u_θ = ω r (r^(−2/n) − r_p^(−2/n)) / (r_t^(−2/n) − r_p^(−2/n)),  τ_rθ r² constant.
+    orbit: V = r_t ω (−cos ωt, sin ωt), the same on the whole circle, as printed in the 2015 paper: the tool's centre
+           runs along a circle of radius r_t, without spin.
+
+    Timesli, Braikat, Lahmam, Zahrouni (2015), section 4; its figures show the spin.
+    """
+
+    kind: Literal["stirring-tool"] = "stirring-tool"
+    motion: Literal["spin", "orbit"] = Field("spin", description="the tool spins about its centre, or translates along a circle")
+    tool_radius: float = Field(1.5, gt=0, description="r_t [mm]")
+    plate_radius: float = Field(6.0, gt=0, description="r_p [mm]")
+    angular_speed: float = Field(100.0, gt=0, description="ω [rad/s]")
+    nodes: RingNodes = Field(default_factory=Rings, description="node set: rings or graded-rings")
+
+    @model_validator(mode="after")
+    def _radii_in_order(self) -> Self:
+        if self.tool_radius >= self.plate_radius:
+            raise ValueError(
+                f"tool_radius = {self.tool_radius:g} mm must be smaller than plate_radius = {self.plate_radius:g} mm"
+            )
+        return self
+
+    @property
+    def reference_rate(self) -> float:
+        """Tool speed over tool radius, ω."""
+        return self.angular_speed
+
+    def cloud(self) -> Cloud:
+        """Rings of nodes; boundary groups "tool" and "plate"."""
+        nodes, counts = nodes_on_rings(*self.nodes.radii(self.tool_radius, self.plate_radius))
+        return Cloud(
+            nodes,
+            {"tool": np.arange(counts[0]), "plate": np.arange(len(nodes) - counts[-1], len(nodes))},
+        )
+
+    def boundary_position(self, cloud: Cloud, time: float) -> np.ndarray:
+        """The tool's nodes turned by ωt, or shifted by r_t (−sin ωt, 1 − cos ωt); the plate's where they were."""
+        position = cloud.nodes.copy()
+        tool = cloud.boundaries["tool"]
+        angle = self.angular_speed * time
+        sine, cosine = np.sin(angle), np.cos(angle)
+        if self.motion == "spin":
+            position[tool] = cloud.nodes[tool] @ np.array([[cosine, sine], [-sine, cosine]])
+        else:
+            position[tool] += self.tool_radius * np.array([-sine, 1.0 - cosine])
+        return position[cloud.boundary]
+
+    def boundary_velocity(self, cloud: Cloud, law: ConstitutiveLaw, time: float) -> np.ndarray:
+        """Adhesion: the tool's velocity on its nodes, zero on the plate's."""
+        velocity = np.zeros_like(cloud.nodes)
+        tool = cloud.boundaries["tool"]
+        if self.motion == "spin":
+            velocity[tool] = self.angular_speed * np.stack([-cloud.nodes[tool, 1], cloud.nodes[tool, 0]], axis=1)
+        else:
+            angle = self.angular_speed * time
+            velocity[tool] = self.tool_radius * self.angular_speed * np.array([-np.cos(angle), np.sin(angle)])
+        return velocity[cloud.boundary]
+
+    def exact(self, law: ConstitutiveLaw, points: np.ndarray, time: float) -> Exact | None:
+        """Spin of a power law: velocity, and torque per mm T = 2 π r² τ_rθ; None for the orbit and other laws."""
+        form = law.power_form()
+        if self.motion != "spin" or form is None:
+            return None
+        power = -2.0 / form.index
+        inner, outer, omega = self.tool_radius, self.plate_radius, self.angular_speed
+        # (r/r_t)^(−2/n) rather than r^(−2/n): no overflow as n → 0.
+        radius = np.hypot(points[:, 0], points[:, 1])
+        far = (outer / inner) ** power
+        turn = omega * ((radius / inner) ** power - far) / (1.0 - far)
+        velocity = np.stack([-turn * points[:, 1], turn * points[:, 0]], axis=1)
+        shear_rate = (2.0 / form.index) * omega / (1.0 - far)  # γ̇ at the tool
+        torque = 2.0 * np.pi * inner**2 * form.shear_consistency * shear_rate**form.index
+        return Exact(velocity, {"torque": torque})
+
+    def contour(self) -> np.ndarray | None:
+        """The circle of radius √(r_t r_p) about the centre of the annulus; none once the tool has left that centre."""
+        if self.motion == "orbit" and self.motion_of_nodes == "lagrangian":
+            return None
+        angle = 2.0 * np.pi * np.arange(720) / 720
+        return np.sqrt(self.tool_radius * self.plate_radius) * np.stack([np.cos(angle), np.sin(angle)], axis=1)

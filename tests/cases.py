@@ -1,0 +1,68 @@
+"""Small flows that several tests share."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from nlsolve_laws import PowerLaw
+from nlsolve_mls import MovingLeastSquares
+from nlsolve_newton import Newton
+from nlsolve_refresh import EveryIteration
+from nlsolve_scenes import StirringTool
+from nlsolve_scenes.rings import Rings
+from nlsolve_superlu import SuperLU
+
+from nlsolve import NonlinearProblem, NonlinearSolver, RefreshRule, Scene
+from nlsolve.driver import Budget, Outcome, StoppingTest, solve
+from nlsolve.flow import Flow
+from nlsolve.ledger import Ledger
+from nlsolve.march import Setup
+from nlsolve.series import Array
+from nlsolve.tangent import Tangent
+
+PLAIN = SuperLU(ordering="mmd-ata")  # no trials of orderings in the counts
+
+
+def spin_flow(index: float, spacing: float = 0.75, regularization: float = 1e-2) -> Flow:
+    """The steady spin on coarse rings."""
+    scene = StirringTool(nodes=Rings(spacing=spacing))
+    law, cloud = PowerLaw(index=index, regularization=regularization), scene.cloud()
+    operators = MovingLeastSquares().operators(cloud, False)
+    return Flow(cloud, operators, law, scene.boundary_velocity(cloud, law, 0.0))
+
+
+def near(flow: Flow, index: float) -> Array:
+    """The unknowns of the exact spin of another index: a start some way off, with every strain rate away from zero."""
+    exact = StirringTool().exact(PowerLaw(index=index), flow.cloud.nodes, 0.0)
+    assert exact is not None
+    return flow.unknowns(exact.velocity)
+
+
+def run(
+    problem: NonlinearProblem,
+    solver: NonlinearSolver,
+    rule: RefreshRule | None,
+    start: Array,
+    linear: Any = PLAIN,
+    stop: StoppingTest | None = None,
+    iterations: int = 200,
+) -> tuple[Outcome, Ledger]:
+    """One solve under the driver, and its books."""
+    ledger = Ledger()
+    tangent = Tangent(linear, rule, ledger)
+    test = stop or StoppingTest(tolerance=1e-10)
+    return solve(problem, solver, tangent, start, test, Budget(iterations=iterations), ledger), ledger
+
+
+def setup(scene: Scene, index: float = 0.5, **parts: Any) -> Setup:
+    """A case: Newton on the default discretisation, but for the parts given."""
+    given: dict[str, Any] = {
+        "law": PowerLaw(index=index, regularization=1e-3),
+        "discretizer": MovingLeastSquares(),
+        "linear": PLAIN,
+        "solver": Newton(),
+        "refresh": EveryIteration(),
+        "starter": Newton(),
+        "stop": StoppingTest(tolerance=1e-10),
+    }
+    return Setup(scene=scene, **(given | parts))
