@@ -2,8 +2,8 @@
 
     python benchmarks/steps_cost.py [repeats]
 
-Prints, on the 2015 paper's 1780 nodes, the median seconds of each piece of work and the two ratios that decide whether a
-series is cheap: p orders over their p triangular solves, and operators over one factorisation.
+Prints, on the 2015 paper's 1780 nodes, the median seconds of each piece of work and the two ratios that decide whether
+a series is cheap: p orders over their p triangular solves, and operators over one factorisation.
 """
 
 from __future__ import annotations
@@ -13,12 +13,14 @@ import sys
 import time
 from collections.abc import Callable
 
-import nlsolve
 import numpy as np
-from nlsolve.flow import Flow
 from threadpoolctl import threadpool_limits
 
+import nlsolve
+from nlsolve.flow import Flow
+
 ORDER = 20
+MOVED = "operators of a moved cloud"
 
 
 def median_seconds(work: Callable[[], object], repeats: int) -> float:
@@ -47,9 +49,7 @@ def measure(volume_points: str, repeats: int) -> None:
     scene, law, discretizer = setup.scene, setup.law, setup.discretizer
     cloud = scene.cloud()
     operators = discretizer.operators(cloud, True)
-    flow = Flow(
-        cloud, operators, law, scene.boundary_velocity(cloud, law, 0.0), scene.penalty_modulus(law)
-    )
+    flow = Flow(cloud, operators, law, scene.boundary_velocity(cloud, law, 0.0), scene.penalty_modulus(law))
     exact = scene.exact(law, cloud.nodes, 0.0)
     assert exact is not None
     state = flow.unknowns(exact.velocity)
@@ -57,20 +57,27 @@ def measure(volume_points: str, repeats: int) -> None:
     factors = setup.linear.factorize(matrix)
     rhs = flow.residual(state)
 
+    within = list[float]()  # seconds of triangular solves inside each series, where the factors have left the cache
+
     def series() -> None:
+        spent = 0.0
         expansion = flow.expand(state)
         step = -expansion.coefficient(0)
         for j in range(1, ORDER + 1):
             if j > 1:
                 step = step - expansion.coefficient(j - 1)
-            expansion.append(factors.solve(step))
+            begun = time.perf_counter()
+            w_j = factors.solve(step)
+            spent += time.perf_counter() - begun
+            expansion.append(w_j)
+        within.append(spent)
 
     def solves() -> None:
         for _ in range(ORDER):
             factors.solve(rhs)
 
     pieces: dict[str, Callable[[], object]] = {
-        "operators of a moved cloud": lambda: discretizer.operators(cloud.moved_to(cloud.nodes), True),
+        MOVED: lambda: discretizer.operators(cloud.moved_to(cloud.nodes), True),
         "residual": lambda: flow.residual(state),
         "Jacobian": lambda: flow.jacobian(state),
         "factorisation": lambda: setup.linear.factorize(matrix, factors),
@@ -78,13 +85,16 @@ def measure(volume_points: str, repeats: int) -> None:
         f"series of {ORDER} orders with its solves": series,
     }
     seconds = {name: median_seconds(work, repeats) for name, work in pieces.items()}
-    print(f"\nvolume points: {volume_points}; {len(cloud.nodes)} nodes, {matrix.nnz} nonzeros, ordering {factors.ordering}")
-    for name, value in seconds.items():
-        print(f"  {name:40s} {1e3 * value:8.2f} ms")
-    whole, bare = seconds[f"series of {ORDER} orders with its solves"], seconds[f"{ORDER} triangular solves"]
+    whole, alone = seconds[f"series of {ORDER} orders with its solves"], seconds[f"{ORDER} triangular solves"]
     limit = 0.5 * seconds["factorisation"] + 0.030
-    print(f"  series over its solves                   {whole / bare:8.2f}      (aim: at most 2.5)")
-    print(f"  operators over (factorisation/2 + 30 ms) {seconds['operators of a moved cloud'] / limit:8.2f}      (aim: at most 1)")
+    print(f"\nvolume points: {volume_points}; {len(cloud.nodes)} nodes, {matrix.nnz} nonzeros, {factors.ordering}")
+    for name, value in seconds.items():
+        print(f"  {name:42s}{1e3 * value:8.2f} ms")
+    print(
+        f"  series over the solves inside it          {whole / statistics.median(within):8.2f}      (aim: at most 2.5)"
+    )
+    print(f"  series over as many solves back to back   {whole / alone:8.2f}")
+    print(f"  operators over (factorisation/2 + 30 ms)  {seconds[MOVED] / limit:8.2f}  (aim: at most 1)")
 
 
 if __name__ == "__main__":

@@ -33,7 +33,7 @@ RUNS: dict[str, str] = {
     "fill": "entries stored in the last factors",
     "factor_solve_ratio": "measured time of one factorisation over one pair of triangular solves",
     "residual_norm": "largest relative residual accepted in any increment, asked for outside the method",
-    "velocity_error": "relative ℓ² error of the nodal velocities at the end against the exact solution, where there is one",
+    "velocity_error": "relative ℓ² error of the nodal velocities at the end, where there is an exact solution",
     "torque": "torque of the moving wall on the material per mm of thickness [N mm/mm]",
     "torque_error": "relative error of the torque against the exact solution",
     "force_x": "force of the moving wall on the material per mm of thickness, x [N/mm]",

@@ -85,6 +85,19 @@ def solve(
     ledger: Ledger,
 ) -> Outcome:
     """Take steps of `solver` on `problem` from `start` until the stopping test, the budget or a failure ends it."""
+    with np.errstate(all="ignore"):  # what is not finite becomes a status, not a warning
+        return _solve(problem, solver, tangent, start, stop, budget, ledger)
+
+
+def _solve(
+    problem: NonlinearProblem,
+    solver: NonlinearSolver,
+    tangent: Tangent,
+    start: Array,
+    stop: StoppingTest,
+    budget: Budget,
+    ledger: Ledger,
+) -> Outcome:
     audited = Audited(problem, ledger)
     scale = problem.scale(start)
     before, rows = start, list[dict[str, Any]]()
@@ -94,7 +107,9 @@ def solve(
         return Outcome(status, detail or status.sentence, before, float(residual_norm), tuple(rows))
 
     if not np.isfinite(scale):
-        return ended(Status.NON_FINITE, "the forces at the first state are not finite: the law gave no finite viscosity")
+        return ended(
+            Status.NON_FINITE, "the forces at the first state are not finite: the law gave no finite viscosity"
+        )
     iterator = iter(solver.steps(audited.view, tangent.view, start))
     first = best = np.inf
     since_best = 0
@@ -108,7 +123,7 @@ def solve(
             return ended(Status.STAGNATED, "the method stopped by itself before the stopping test was met")
         residual_norm = float(np.linalg.norm(audited.residual(step.state))) / scale
         difference = stop.difference(step.state, before) if number else np.nan
-        before = step.state
+        before = step.state.copy()  # a method may go on working in its array
         rows.append(
             {
                 "step": number,

@@ -54,7 +54,8 @@ class Flow(NonlinearProblem):
         self._strain = operators.strain[:, self._free]
         self._strain_boundary = operators.strain @ lifted
         self._force = operators.force
-        self._gradient = self._dilatation = None
+        self._gradient: Any = None
+        self._dilatation: Any = None
         self._inertia = 0.0
         constant = np.zeros(len(self._free))
         if operators.dilatation is not None and penalty_modulus > 0.0:

@@ -1,8 +1,8 @@
 """Counts and times all work a method asks for, outside the method.
 
-A method is handed a view of its problem and of the kept tangent K*. The views offer residuals, Jacobians, expansions and
-solves, each entered here; a Jacobian is handed out sealed, so that it can be multiplied with (counted) and factorised
-(counted) but not read. No attribute of a view leads to the uncounted problem, matrix or factors behind it.
+A method is handed a view of its problem and of the kept tangent K*. The views offer residuals, Jacobians, expansions
+and solves, each entered here; a Jacobian is handed out sealed, so that it can be multiplied with (counted) and
+factorised (counted) but not read. No attribute of a view leads to the uncounted problem, matrix or factors behind it.
 """
 
 from __future__ import annotations
@@ -114,11 +114,20 @@ def _view(problem: NonlinearProblem, ledger: Ledger, remember: Any) -> Nonlinear
 
     class CountedExpansion(Expansion):
         def __init__(self, expansion: Expansion) -> None:
-            def coefficient(j: int) -> Array:
-                with ledger.entry("series_order" if j else "residual"):
-                    return expansion.coefficient(j)
+            known = 1  # the residual itself was computed, and counted, where the expansion was made
 
-            self._coefficient, self._append, self._sum = coefficient, expansion.append, expansion.path
+            def coefficient(j: int) -> Array:
+                nonlocal known
+                while known <= j:  # orders that are skipped over are work too; an order asked for again is not
+                    with ledger.entry("series_order"):
+                        expansion.coefficient(known)
+                    known += 1
+                return expansion.coefficient(j)
+
+            # Functions, not bound methods: a bound method gives its owner away.
+            self._coefficient = coefficient
+            self._append = lambda term: expansion.append(term)
+            self._sum = lambda a: expansion.path(a)
 
         def coefficient(self, j: int) -> Array:
             return self._coefficient(j)
@@ -144,9 +153,13 @@ def _view(problem: NonlinearProblem, ledger: Ledger, remember: Any) -> Nonlinear
             return sealed
 
         def expand(self, u: Array) -> Expansion:
-            return CountedExpansion(problem.expand(u))
+            with ledger.entry("residual"):
+                expansion = problem.expand(u)
+                expansion.coefficient(0)
+            return CountedExpansion(expansion)
 
         def scale(self, u: Array) -> float:
-            return problem.scale(u)
+            with ledger.entry("residual"):  # it costs what a residual costs
+                return problem.scale(u)
 
     return CountedProblem()

@@ -11,15 +11,15 @@ import numpy as np
 import pandas as pd
 from pydantic import Field
 
-from nlsolve import driver
 from nlsolve.columns import STEPS
 from nlsolve.component import Component
 from nlsolve.discretizers import Discretizer, Operators
-from nlsolve.driver import Budget, Outcome, StoppingTest
+from nlsolve.driver import Budget, Outcome, StoppingTest, solve
 from nlsolve.flow import Flow, Inertia
-from nlsolve.laws import ConstitutiveLaw, rate_squared
+from nlsolve.laws import ConstitutiveLaw
 from nlsolve.ledger import Ledger
 from nlsolve.linear import LinearSolver
+from nlsolve.measures import nodal_fields, velocity_error, wall_reaction
 from nlsolve.scenes import Scene
 from nlsolve.series import Array
 from nlsolve.solvers import NonlinearSolver, RefreshRule
@@ -36,7 +36,9 @@ class Start(Component):
 
     noun: ClassVar[str] = "start"
 
-    by: str = Field("index", description="field of the law that is varied: index (from 1) or regularization (from large)")
+    by: str = Field(
+        "index", description="field of the law that is varied: index (from 1) or regularization (from large)"
+    )
     values: tuple[float, ...] = Field((1.0, 0.5, 0.3, 0.2), description="its values on the way, in order")
     tolerance: float = Field(1e-10, gt=0, description="relative residual of the first state")
 
@@ -52,9 +54,9 @@ class Setup:
     solver: NonlinearSolver
     refresh: RefreshRule
     starter: NonlinearSolver
-    stop: StoppingTest = StoppingTest()
-    start: Start = Start()
-    budget: Budget = Budget()
+    stop: StoppingTest = field(default_factory=StoppingTest)
+    start: Start = field(default_factory=Start)
+    budget: Budget = field(default_factory=Budget)
     record: tuple[float, ...] = ()
     """Times [s] at which the fields are recorded, besides the last."""
 
@@ -71,7 +73,7 @@ class Progress:
 
 @dataclass(frozen=True)
 class Record:
-    """What one case leaves: its row of `runs`, its rows of `steps`, and its `fields` (a row a node and recorded time)."""
+    """What one case leaves: its row of `runs`, its rows of `steps`, its `fields` (a row a node and recorded time)."""
 
     summary: dict[str, Any]
     steps: pd.DataFrame
@@ -99,7 +101,9 @@ class _March:
         self.increments = self.iterations = 0
         self.validity_time: float | None = None
         self.residual_norm = float("nan")
-        self.flow: Flow | None = None
+        self.sizes: dict[str, int | None] = {"nodes": None, "unknowns": None}
+        self.operators: Operators
+        self.flow: Flow | None = None  # of the last solved increment
 
     def run(self) -> Record:
         status, detail = Status.CONVERGED, Status.CONVERGED.sentence
@@ -120,6 +124,7 @@ class _March:
     def begin(self) -> None:
         """The cloud at t = 0, its operators, and rest inside."""
         self.initial = self.cloud = self.scene.cloud()
+        self.sizes = {"nodes": len(self.cloud.nodes), "unknowns": 2 * len(self.cloud.interior)}
         self.build_operators()
         self.velocity = np.zeros_like(self.cloud.nodes)
         self.before: Array | None = None  # velocity one increment earlier, for the second-order motion of nodes
@@ -147,13 +152,13 @@ class _March:
             outcome = self.solve_increment(0, self.flow_of(target))
         assert outcome is not None
         if outcome.status is Status.CONVERGED:
-            self.snapshot_if_due()
+            self.record_fields_if_due()
         return outcome
 
     def start_stage(self, law: ConstitutiveLaw) -> Outcome:
         setup = self.setup
         flow = self.flow_of(law)
-        outcome = driver.solve(
+        outcome = solve(
             flow,
             setup.starter,
             self.start_tangent,
@@ -163,7 +168,7 @@ class _March:
             self.start_ledger,
         )
         if outcome.status is Status.CONVERGED:
-            self.velocity = flow.velocity(outcome.state)
+            self.flow, self.velocity = flow, flow.velocity(outcome.state)
         return outcome
 
     def advance(self, k: int) -> Outcome:
@@ -179,7 +184,7 @@ class _March:
         outcome = self.solve_increment(k, self.flow_of(self.setup.law, inertia))
         self.before = previous
         if outcome.status is Status.CONVERGED:
-            self.snapshot_if_due()
+            self.record_fields_if_due()
         return outcome
 
     def move_nodes(self) -> None:
@@ -191,7 +196,7 @@ class _March:
 
     def build_operators(self) -> None:
         with self.ledger.entry("operators"):
-            self.operators: Operators = self.setup.discretizer.operators(self.cloud, self.volumetric)
+            self.operators = self.setup.discretizer.operators(self.cloud, self.volumetric)
 
     def flow_of(self, law: ConstitutiveLaw, inertia: Inertia | None = None) -> Flow:
         return Flow(
@@ -206,23 +211,24 @@ class _March:
 
     def solve_increment(self, k: int, flow: Flow) -> Outcome:
         """The case's own method on one increment; its rows, counts and largest residual are kept."""
-        setup, branches = self.setup, self.tangent.branches
-        outcome = driver.solve(
+        setup = self.setup
+        outcome = solve(
             flow, setup.solver, self.tangent, flow.unknowns(self.velocity), setup.stop, setup.budget, self.ledger
         )
         solved = outcome.status is Status.CONVERGED
         self.iterations += max(0, len(outcome.steps) - 1)
         self.rows += [{"increment": k, "time": self.time, "accepted": False, **row} for row in outcome.steps]
-        if self.validity_time is None and branches >= 1 and self.tangent.branches > 1:
+        if self.validity_time is None and self.scene.increments and self.tangent.branches > 1:
             self.validity_time = (k - 1) * self.scene.increment
         self.residual_norm = float(np.fmax(self.residual_norm, outcome.residual_norm))
         if solved:
-            self.flow = flow
-            self.velocity = flow.velocity(outcome.state)
+            self.flow, self.velocity = flow, flow.velocity(outcome.state)
             self.increments += 1
             self.rows[-1]["accepted"] = True
             if self.probe is not None:
-                places = zip(("x", "y", "u", "v"), (*self.cloud.nodes[self.probe], *self.velocity[self.probe]), strict=True)
+                places = zip(
+                    ("x", "y", "u", "v"), (*self.cloud.nodes[self.probe], *self.velocity[self.probe]), strict=True
+                )
                 self.rows[-1] |= {f"probe_{name}": value for name, value in places}
         self.listen(
             Progress(
@@ -236,54 +242,30 @@ class _March:
 
     # What is left behind.
 
-    def snapshot_if_due(self) -> None:
-        """Record the fields when this time, to half an increment, is one of those asked for, or the last."""
+    def record_fields_if_due(self) -> None:
+        """Keep the fields when this time, to half an increment, is one of those asked for, or the last."""
         asked = (*self.setup.record, self.scene.horizon or 0.0)
-        half = 0.5 * self.scene.increment
-        if any(abs(self.time - moment) < half for moment in asked):
-            self.snapshots.append(self.snapshot())
-
-    def snapshot(self) -> pd.DataFrame:
-        nodes, cloud = self.cloud.nodes, self.cloud
-        flow = self.flow or self.flow_of(self.setup.law)
-        values = self.setup.discretizer.values(self.operators.strain_points, nodes)
-        strain_rate = (self.operators.strain @ self.velocity.ravel()).reshape(3, -1)
-        at_nodes = np.stack([values @ component for component in strain_rate])
-        exact = self.scene.exact(flow.law, nodes, self.time)
-        names = np.full(len(nodes), "", dtype=object)
-        for name, group in cloud.boundaries.items():
-            names[group] = name
-        return pd.DataFrame(
-            {
-                "time": self.time,
-                "node": np.arange(len(nodes)),
-                "boundary": names,
-                "x0": self.initial.nodes[:, 0],
-                "y0": self.initial.nodes[:, 1],
-                "x": nodes[:, 0],
-                "y": nodes[:, 1],
-                "u": self.velocity[:, 0],
-                "v": self.velocity[:, 1],
-                "exx": at_nodes[0],
-                "eyy": at_nodes[1],
-                "exy": at_nodes[2],
-                "rate": np.sqrt(rate_squared(at_nodes)),
-                "exact_u": exact.velocity[:, 0] if exact else np.nan,
-                "exact_v": exact.velocity[:, 1] if exact else np.nan,
-            }
-        )
+        if any(abs(self.time - moment) < 0.5 * self.scene.increment for moment in asked):
+            assert self.flow is not None
+            self.snapshots.append(
+                nodal_fields(self.scene, self.setup.discretizer, self.flow, self.velocity, self.initial, self.time)
+            )
 
     def record(self, status: Status, detail: str) -> Record:
+        """The row of the case, whatever its ending; what is measured on fields is of the last solved increment."""
         ledger, start = self.ledger, self.start_ledger
         factors = self.tangent.factors
+        reached = self.increments * self.scene.increment if self.scene.increments else 0.0
         validity = self.validity_time
-        if validity is None and self.increments:
-            validity = self.time if self.scene.increments else None
+        if validity is None and self.scene.increments and self.increments:
+            validity = reached  # the first tangent served to the end
+        message = detail if detail == status.sentence or status is Status.CONVERGED else f"{status.sentence}; {detail}"
         summary: dict[str, Any] = {
             "status": status.word,
-            "message": detail if status is Status.CONVERGED else f"{status.sentence}; {detail}" if detail != status.sentence else detail,
+            "message": message,
+            **self.sizes,
             "increments": self.increments,
-            "time": self.time,
+            "time": reached,
             "iterations": self.iterations,
             "branches": self.tangent.branches,
             "validity_time": validity,
@@ -308,44 +290,9 @@ class _March:
             "factor_solve_ratio": ledger.each("factorization") / ledger.each("triangular_solve"),
             "residual_norm": self.residual_norm,
         }
-        if hasattr(self, "cloud"):
-            summary |= {"nodes": len(self.cloud.nodes), "unknowns": 2 * len(self.cloud.interior)}
         if self.flow is not None:
-            summary |= self.errors(self.flow) | self.wall_reaction(self.flow)
+            summary |= velocity_error(self.scene, self.flow, self.velocity, reached)
+            summary |= wall_reaction(self.scene, self.setup.discretizer, self.flow, self.velocity, reached)
         steps = pd.DataFrame(self.rows, columns=[name for name in STEPS if name != "case"])
         fields = pd.concat(self.snapshots, ignore_index=True) if self.snapshots else pd.DataFrame()
         return Record(summary, steps, fields)
-
-    def errors(self, flow: Flow) -> dict[str, float]:
-        """Relative ℓ² error of the velocities at the last solved increment, where the scene has an exact solution."""
-        exact = self.scene.exact(flow.law, flow.cloud.nodes, self.time)
-        if exact is None:
-            return {}
-        return {"velocity_error": float(np.linalg.norm(self.velocity - exact.velocity) / np.linalg.norm(exact.velocity))}
-
-    def wall_reaction(self, flow: Flow) -> dict[str, float]:
-        """Force −∮ σ n ds and torque −∮ x × σ n ds of the moving wall on the material, over the scene's contour."""
-        contour = self.scene.contour()
-        if contour is None:
-            return {}
-        edges = np.roll(contour, -1, axis=0) - contour
-        middles = contour + 0.5 * edges
-        normals = np.stack([edges[:, 1], -edges[:, 0]], axis=1)  # outward of a counter-clockwise contour, times length
-        u = flow.unknowns(self.velocity)
-        values = self.setup.discretizer.values(flow.operators.strain_points, middles)
-        xx, yy, xy = (values @ component for component in flow.stress_at_points(u))
-        pressure = flow.pressure_stress(u)
-        if pressure is not None and flow.operators.volume_points is not None:
-            volumetric = self.setup.discretizer.values(flow.operators.volume_points, middles) @ pressure
-            xx, yy = xx + volumetric, yy + volumetric
-        traction = np.stack([xx * normals[:, 0] + xy * normals[:, 1], xy * normals[:, 0] + yy * normals[:, 1]], axis=1)
-        moment = middles[:, 0] * traction[:, 1] - middles[:, 1] * traction[:, 0]
-        reaction = {
-            "force_x": -float(traction[:, 0].sum()),
-            "force_y": -float(traction[:, 1].sum()),
-            "torque": -float(moment.sum()),
-        }
-        exact = self.scene.exact(flow.law, flow.cloud.nodes, self.time)
-        if exact is not None and "torque" in exact.quantities:
-            reaction["torque_error"] = abs(reaction["torque"] / exact.quantities["torque"] - 1.0)
-        return reaction

@@ -96,8 +96,12 @@ class Scene(Component, ABC):
     increment: float = Field(1e-4, gt=0, description="time step of the march [s]")
     density: float = Field(2.81e-9, gt=0, description="mass density [t/mm³]")
     inertia: bool = Field(False, description="keep the term ρ (V − V_k)/Δt")
-    penalty: float | None = Field(None, ge=0, description="λ/μ at the reference strain rate; absent: no volumetric term")
-    motion_of_nodes: Literal["fixed", "lagrangian"] = Field("fixed", description="nodes stay, or move with the material")
+    penalty: float | None = Field(
+        None, ge=0, description="λ/μ at the reference strain rate; absent: no volumetric term"
+    )
+    motion_of_nodes: Literal["fixed", "lagrangian"] = Field(
+        "fixed", description="nodes stay, or move with the material"
+    )
     probe: tuple[float, float] | None = Field(None, description="place whose nearest node is recorded in time [mm]")
 
     @property
@@ -135,10 +139,6 @@ class Scene(Component, ABC):
     def exact(self, law: ConstitutiveLaw, points: Array, time: float) -> Exact | None:
         """The closed quasi-static solution for this law, or None where there is none."""
         return None
-
-    def inside(self, points: Array, time: float) -> NDArray[np.bool_]:
-        """True where a point (N, 2) lies in the material; used to blank holes in figures."""
-        return np.ones(len(points), dtype=bool)
 
     def contour(self) -> Array | None:
         """A closed polygon (C, 2) around the moving wall, in the material, for force and torque; None without one."""

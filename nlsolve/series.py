@@ -33,7 +33,7 @@ class Series:
 
     def __init__(self, start: ArrayLike) -> None:
         self._rule: Callable[[int], Array] | None = None
-        self._terms = [np.asarray(start, dtype=float)]
+        self._terms = [np.array(start, dtype=float)]
         self._packed = 0
         self._buffer: Array | None = None
 
@@ -54,7 +54,7 @@ class Series:
         """Push the next coefficient of a series begun with `Series(y_0)`."""
         if self._rule is not None:
             raise TypeError("this series follows from others by a formula: append to the series it was made from")
-        term = np.asarray(coefficient, dtype=float)
+        term = np.array(coefficient, dtype=float)
         if term.shape != self.shape:
             raise ValueError(f"a coefficient of shape {term.shape} in a series of shape {self.shape}")
         self._terms.append(term)
@@ -143,9 +143,14 @@ class Series:
     def __pow__(self, exponent: Any) -> Series:
         if not isinstance(exponent, Number):
             raise TypeError("a series can be raised to a constant power only; write exp(y log x) for a varying one")
-        if exponent == 2:
-            return _product(self, self)
-        return _power(self, float(exponent))  # type: ignore[arg-type]
+        power = float(exponent)  # type: ignore[arg-type]
+        if power.is_integer() and power >= 1.0:  # by products, which are analytic at zero too
+            half = self if power < 4.0 else self ** (power // 2.0)
+            if power == 1.0:
+                return self
+            square = _product(half, half)
+            return square if power % 2.0 == 0.0 else _product(square, self)
+        return _power(self, power)
 
     # What has no Taylor coefficients.
 
@@ -156,8 +161,8 @@ class Series:
         )
 
     __abs__ = __lt__ = __le__ = __gt__ = __ge__ = __bool__ = __float__ = _refuse
-    __eq__ = __ne__ = _refuse  # type: ignore[assignment]
-    __hash__ = object.__hash__  # type: ignore[assignment]
+    __eq__ = __ne__ = _refuse
+    __hash__ = object.__hash__
 
     def __array_ufunc__(self, ufunc: np.ufunc, method: str, *inputs: Any, **options: Any) -> Series:
         formula = _FORMULAS.get(ufunc)

@@ -1,9 +1,9 @@
 """Methods yield states; everything else (counting, timing, stopping) is done around them. Contracts of strategies.
 
-    while True:
-        yield Step(state)
-        tangent.refresh_if_due(problem, state)
-        state = state - tangent.solve(problem.residual(state))
+while True:
+    yield Step(state)
+    tangent.refresh_if_due(problem, state)
+    state = state - tangent.solve(problem.residual(state))
 """
 
 from __future__ import annotations

@@ -8,7 +8,7 @@ import json
 import re
 import tomllib
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -51,7 +51,7 @@ class Case:
 
     id : digest of the validated components.
     parameters : every parameter under its dotted name ("solver.order"); lists as JSON text.
-    swept : the names among them that the study sweeps.
+    swept : the names among them that the study sweeps and that differ between its cases.
     """
 
     id: str
@@ -209,7 +209,16 @@ class _Builder:
             else:
                 cases.setdefault(case.id, case)  # what is set by hand may make two cases one
         self.refuse(problems)
-        return tuple(cases.values())
+        everyone = [case.parameters for case in cases.values()]
+        differing = {
+            name
+            for parameters in everyone
+            for name, value in parameters.items()
+            if any(name not in other or other[name] != value for other in everyone)
+        }
+        return tuple(
+            replace(case, swept=tuple(name for name in case.swept if name in differing)) for case in cases.values()
+        )
 
     def case(self, document: Document, swept: tuple[str, ...]) -> Case:
         """Validate one combination. Raises _Refused."""

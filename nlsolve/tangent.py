@@ -17,8 +17,8 @@ from nlsolve.status import SolveError, Status
 class Tangent:
     """The kept tangent of one march: its factors, what has been observed of it, and its refresh rule.
 
-    Without a rule it is renewed at every iteration. `pattern` are factors of a like matrix, which may lend their ordering.
-    Methods see it through `view` only.
+    Without a rule it is renewed at every iteration. `pattern` are factors of a like matrix, which may lend their
+    ordering. Methods see it through `view` only.
     """
 
     def __init__(

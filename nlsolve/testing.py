@@ -144,7 +144,6 @@ def check_scene(scene: Scene, law: ConstitutiveLaw) -> None:
     inside = cloud.nodes[cloud.interior]
     force = scene.body_force(inside, law)
     _require(force is None or force.shape == inside.shape, "body_force must have the shape of its points")
-    _require(scene.inside(inside, 0.0).all(), "inside() denies a node of the cloud")
     contour = scene.contour()
     _require(contour is None or (contour.ndim == 2 and contour.shape[1] == 2), "contour() must be a polygon (C, 2)")
     exact = scene.exact(law, cloud.nodes, 0.0)

@@ -18,18 +18,10 @@ from matplotlib.text import Text
 from pydantic import TypeAdapter, ValidationError
 
 from nlsolve.columns import FIELDS
-from nlsolve.figures import (
-    MOST_PANELS,
-    BaseFigure,
-    FigureError,
-    FigureSpec,
-    axis_label,
-    draw,
-    outline,
-    save,
-    slice_triangles,
-    triangulate,
-)
+from nlsolve.figures import BaseFigure, FigureError, FigureSpec, draw, save
+from nlsolve.figures.nodes import MOST_PANELS
+from nlsolve.figures.sections import outline, slice_triangles, triangulate
+from nlsolve.figures.style import axis_label
 
 ADAPTER: TypeAdapter[BaseFigure] = TypeAdapter(FigureSpec)
 INNER, OUTER, RINGS = 1.5, 6.0, 7
@@ -301,6 +293,17 @@ def test_small_multiples_share_colours_and_show_who_is_missing(frames: dict[str,
     assert "no values" in [text.get_text() for text in figure.axes[3].findobj(Text)]
     assert len(figure.axes) == 5
     assert figure.get_figwidth() == pytest.approx(180 / 25.4)
+
+
+def test_every_column_of_panels_has_its_axis_and_a_title_is_off_the_legend(frames: dict[str, pd.DataFrame]) -> None:
+    five = [f"r{number}" for number in range(5)]
+    runs = pd.concat([frames["runs"].iloc[:1].assign(case=case) for case in five])
+    fields = pd.concat([snapshot(case, 0.0) for case in five])
+    figure = picture(frames | {"runs": runs, "fields": fields}, kind="cloud", title="Five")
+    assert [bool(axes.get_xlabel()) for axes in figure.axes] == [False, False, True, True, True]
+    figure.draw_without_rendering()
+    (heading,) = [text for text in figure.texts if text.get_text() == "Five"]
+    assert not heading.get_window_extent().overlaps(figure.legends[0].get_window_extent())
 
 
 def test_a_field_at_rest_is_drawn(frames: dict[str, pd.DataFrame]) -> None:

@@ -18,13 +18,13 @@ PLUGINS = HOUSE.parent / "plugins"
 FLOORS = [
     "series component status columns",
     "laws scenes discretizers linear problems solvers",
-    "flow tangent march ledger driver",
+    "flow tangent march measures ledger driver",
     "hookspecs registry",
-    "studies locate errors sweeps runner store tables papers figures report plan",
+    "studies locate errors sweeps runner store tables papers report plan figures",
     "testing small cli progress __init__",
 ]
 FLOOR = {name: number for number, names in enumerate(FLOORS) for name in names.split()}
-MODULES = sorted(HOUSE.glob("*.py"))
+MODULES = sorted(HOUSE.rglob("*.py"))
 PLUGIN_MODULES = sorted(PLUGINS.rglob("*.py"))
 LIBRARIES = {"nlsolve", "numpy", "scipy", "pydantic"}
 
@@ -39,26 +39,41 @@ def imports(path: Path) -> Iterator[tuple[str, list[str]]]:
             yield node.module or "", [alias.name for alias in node.names]
 
 
+def name_of(path: Path) -> str:
+    """A module's name inside the house: "march", "figures.line", "figures", "__init__"."""
+    parts = path.relative_to(HOUSE).with_suffix("").parts
+    return ".".join(parts[:-1] if parts[-1] == "__init__" and len(parts) > 1 else parts)
+
+
+NAMES = {name_of(path) for path in MODULES}
+
+
+def floor_of(name: str) -> int:
+    """A package stands on one floor with all its modules."""
+    return FLOOR[name.split(".")[0]]
+
+
 def inside(path: Path) -> set[str]:
-    """Modules of the house that a file imports, by their short names."""
+    """Modules of the house that a file imports."""
     found = set()
     for module, names in imports(path):
         if module == "nlsolve":
-            found |= {name if name in FLOOR else "__init__" for name in names}
+            found |= {name if name in NAMES else "__init__" for name in names}
         elif module.startswith("nlsolve."):
-            found.add(module.split(".")[1])
+            found.add(module.removeprefix("nlsolve."))
     return found
 
 
-@pytest.mark.parametrize("path", MODULES, ids=lambda path: path.stem)
+@pytest.mark.parametrize("path", MODULES, ids=name_of)
 def test_imports_go_downwards(path):
-    assert path.stem in FLOOR, "a new module belongs to a floor"
-    above = {name for name in inside(path) if FLOOR[name] > FLOOR[path.stem]}
-    assert not above, f"{path.stem} (floor {FLOOR[path.stem]}) imports {above}"
+    name = name_of(path)
+    assert name.split(".")[0] in FLOOR, "a new module belongs to a floor"
+    above = {other for other in inside(path) if floor_of(other) > floor_of(name)}
+    assert not above, f"{name} (floor {floor_of(name)}) imports {above}"
 
 
 def test_neighbours_do_not_import_each_other_in_a_circle():
-    TopologicalSorter({path.stem: inside(path) for path in MODULES}).prepare()
+    TopologicalSorter({name_of(path): inside(path) for path in MODULES}).prepare()
 
 
 @pytest.mark.parametrize("path", [*MODULES, *PLUGIN_MODULES], ids=lambda path: f"{path.parent.name}-{path.stem}")

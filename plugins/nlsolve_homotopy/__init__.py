@@ -23,6 +23,7 @@ from nlsolve import (
     hookimpl,
 )
 
+ROUNDING = 1e-10  # W_2 below this part of W_1 is rounding: K* is the tangent
 SHORTEST_RANGE = 1e-6  # a series that advances less than this part of its path is exhausted
 
 
@@ -69,9 +70,7 @@ class AsymptoticNumericalMethod(NonlinearSolver):
             state = series.path(length)
             yield Step(state, claim=length == 1.0, notes=notes)
 
-    def _series(
-        self, problem: NonlinearProblem, tangent: KeptTangent, state: np.ndarray
-    ) -> tuple[Expansion, float]:
+    def _series(self, problem: NonlinearProblem, tangent: KeptTangent, state: np.ndarray) -> tuple[Expansion, float]:
         """W_1 … W_p around `state`, and a_max."""
         series = problem.expand(state)
         rhs = -series.coefficient(0)
@@ -84,6 +83,11 @@ class AsymptoticNumericalMethod(NonlinearSolver):
             sizes.append(float(np.linalg.norm(w_j)))
         if sizes[1] == 0.0:
             return series, np.inf
+        if self.order == 2 and sizes[2] <= ROUNDING * sizes[1]:
+            raise SolveError(
+                Status.RANGE_EXHAUSTED,
+                "W_2 vanishes because K* is the tangent here, so a series of order 2 has no range: use order 3 or more",
+            )
         last = [j for j in (self.order - 1, self.order) if j > 1 and sizes[j] > 0.0]
         ranges = [(self.tolerance * sizes[1] / sizes[j]) ** (1.0 / (j - 1)) for j in last]
         return series, min(ranges, default=np.inf)

@@ -1,4 +1,4 @@
-"""B and S by moving least squares: strain rates at stress points from nodes, divergence of stress at nodes from those."""
+"""B and S by moving least squares: strain rates at stress points from nodes, divergence of stress back at nodes."""
 
 from __future__ import annotations
 

@@ -2,8 +2,9 @@
 
 At each target a polynomial, centred there and scaled by the radius of the support, is fitted to the values at k
 neighbours with weights w. With √w P = Q R (thin QR; P holds the k × c monomials) the weights of a linear functional L
-follow from one triangular solve. Q and R are built by Gram-Schmidt carried out twice, which keeps Q orthogonal to working
-precision ("twice is enough": Giraud, Langou, Rozložník 2005), for all T targets together: arrays have the target last.
+follow from one triangular solve. Q and R are built by Gram-Schmidt carried out twice, which keeps Q orthogonal to
+working precision ("twice is enough": Giraud, Langou, Rozložník 2005), for all T targets together: arrays have the
+target last.
 Lancaster & Salkauskas (1981); Timesli et al. (2015), section 3.
 """
 
@@ -18,7 +19,6 @@ from scipy.spatial import cKDTree
 from nlsolve import SolveError, Status
 
 SMALLEST_PIVOT = 1e-8  # of R, relative to its column: below, the support does not determine the polynomial
-WEIGHTS = ("gaussian", "quartic", "spline")
 
 
 def weight_function(name: str, s: np.ndarray, shape: float) -> np.ndarray:
@@ -46,7 +46,10 @@ class Supports:
                 Status.BAD_CLOUD, f"a support of {count} neighbours was asked for among {len(sources)} points"
             )
         distance, index = cKDTree(sources).query(targets, count + 1)
-        return cls(index[:, :count], 0.5 * (distance[:, count - 1] + distance[:, count]))
+        return cls(
+            index[:, :count],
+            np.maximum(0.5 * (distance[:, count - 1] + distance[:, count]), 1.001 * distance[:, count - 1]),
+        )
 
     @classmethod
     def within(cls, sources: np.ndarray, targets: np.ndarray, radius: float) -> Supports:

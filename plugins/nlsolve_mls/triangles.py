@@ -1,8 +1,8 @@
 """The Delaunay triangles of a cloud: their edges' midpoints, and merged pairs of them as volume points.
 
-The mean of div v over a patch of two linear triangles is taken at about one patch per node; a volumetric penalty on every
-triangle or strain point would lock. S_θ = −A_i⁻¹ B_θᵀ A, the conservative partner of B_θ, keeps the penalty semi-definite,
-so that no λ can make the tangent singular, and a constant pressure exerts no force.
+The mean of div v over a patch of two linear triangles is taken at about one patch per node; a volumetric penalty on
+every triangle or strain point would lock. S_θ = −A_i⁻¹ B_θᵀ A, the conservative partner of B_θ, keeps the penalty
+semi-definite, so that no λ can make the tangent singular, and a constant pressure exerts no force.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
-from scipy.spatial import Delaunay
+from scipy.spatial import Delaunay, QhullError
 
 from nlsolve import Cloud, SolveError, Status
 
@@ -28,7 +28,10 @@ class Triangles:
     @classmethod
     def of(cls, cloud: Cloud) -> Triangles:
         """Delaunay's triangulation, less the triangles whose three nodes lie on one and the same boundary."""
-        corners = Delaunay(cloud.nodes).simplices
+        try:
+            corners = Delaunay(cloud.nodes).simplices
+        except QhullError as error:
+            raise SolveError(Status.BAD_CLOUD, "the nodes lie on one line: they span no triangles") from error
         group = np.zeros(len(cloud.nodes), dtype=int)
         for number, members in enumerate(cloud.boundaries.values(), start=1):
             group[members] = number
@@ -103,9 +106,7 @@ class Triangles:
         columns = 2 * corners[:, :, None] + np.arange(2)
         rows = np.broadcast_to(patch[:, None, None], columns.shape)
         # Patch area times mean divergence: the net flux out of each patch.
-        net_flux = sp.csr_array(
-            (flux.ravel(), (rows.ravel(), columns.ravel())), shape=(count, 2 * len(nodes))
-        )
+        net_flux = sp.csr_array((flux.ravel(), (rows.ravel(), columns.ravel())), shape=(count, 2 * len(nodes)))
         patch_area = np.bincount(patch, areas, count)
         node_area = np.bincount(corners.ravel(), np.repeat(areas / 3.0, 3), len(nodes))
         free = np.stack([2 * self.cloud.interior, 2 * self.cloud.interior + 1], axis=1).ravel()

@@ -39,7 +39,9 @@ class Channel(Scene):
         """A regular grid, jittered inside; boundary groups "bottom", "top", "inlet", "outlet"."""
         columns = max(2, round(self.length / self.spacing)) + 1
         rows = max(2, round(2.0 * self.half_height / self.spacing)) + 1
-        x, y = np.meshgrid(np.linspace(0.0, self.length, columns), np.linspace(-self.half_height, self.half_height, rows))
+        x, y = np.meshgrid(
+            np.linspace(0.0, self.length, columns), np.linspace(-self.half_height, self.half_height, rows)
+        )
         nodes = np.stack([x.ravel(), y.ravel()], axis=1)
         number = np.arange(rows * columns).reshape(rows, columns)
         boundaries = {"bottom": number[0], "top": number[-1], "inlet": number[1:-1, 0], "outlet": number[1:-1, -1]}

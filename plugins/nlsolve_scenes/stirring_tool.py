@@ -23,7 +23,9 @@ class StirringTool(Scene):
     """
 
     kind: Literal["stirring-tool"] = "stirring-tool"
-    motion: Literal["spin", "orbit"] = Field("spin", description="the tool spins about its centre, or translates along a circle")
+    motion: Literal["spin", "orbit"] = Field(
+        "spin", description="the tool spins about its centre, or translates along a circle"
+    )
     tool_radius: float = Field(1.5, gt=0, description="r_t [mm]")
     plate_radius: float = Field(6.0, gt=0, description="r_p [mm]")
     angular_speed: float = Field(100.0, gt=0, description="ω [rad/s]")

@@ -1,0 +1,76 @@
+"""Orders of convergence of the steady spin, and the orbit against an independent finite element solution.
+
+    python benchmarks/accuracy.py
+
+Prints observed orders between clouds whose spacings are all scaled by s, and for the orbit the largest difference from
+the reference (tests/reference) off the walls, in parts of the tool speed, and the difference in drag.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+import nlsolve
+
+REFERENCE = Path(__file__).parent.parent / "tests" / "reference"
+DRAG = {1.0: -205426.58, 0.3: -12224.03}  # N/mm
+TOOL_SPEED = 150.0  # mm/s
+
+
+def steady(scene: dict[str, Any], index: float, **sections: Any) -> nlsolve.Results:
+    """One steady state by Newton's method."""
+    return nlsolve.run(
+        {
+            "question": "how accurate is this steady state?",
+            "scene": {"kind": "stirring-tool", **scene},
+            "law": {"kind": "power-law", "index": index, "regularization": 1e-3},
+            "discretizer": {"kind": "mls"},
+            "solver": {"kind": "newton"},
+            **sections,
+        }
+    )
+
+
+def orders() -> None:
+    """Graded rings with h(r) = s min(0.1 + 0.12 (r − r_t), 0.25) mm; the order is that of the mean spacing N^(−1/2)."""
+    for index in (1.0, 0.3):
+        print(f"\nsteady spin, n = {index}:       s    nodes   velocity error   order")
+        before: tuple[int, float] | None = None
+        for s in (1.4, 1.0, 0.7, 0.5):
+            nodes = {"kind": "graded-rings", "first": 0.1 * s, "growth": 0.12 * s, "spacing": 0.25 * s}
+            run = steady({"nodes": nodes}, index).runs.iloc[0]
+            count, error = int(run["nodes"]), float(run["velocity_error"])
+            order = "" if before is None else f"{2 * np.log(before[1] / error) / np.log(count / before[0]):.2f}"
+            print(f"                           {s:4.1f} {count:8d} {100 * error:15.4f}%  {order:>6s}")
+            before = (count, error)
+
+
+def orbit() -> None:
+    """λ/μ(100 1/s) = 1e4 on graded rings."""
+    nodes = {"kind": "graded-rings", "first": 0.03, "growth": 0.15}
+    for index, drag in DRAG.items():
+        results = steady(
+            {"motion": "orbit", "penalty": 1e4, "nodes": nodes}, index, start={"values": [1.0, 0.7, 0.5, 0.4]}
+        )
+        run, fields = results.runs.iloc[0], results.fields
+        reference = pd.read_csv(REFERENCE / f"orbit_n{index:.1f}.csv")
+        radius = np.hypot(reference["x"], reference["y"])
+        reference = reference[(radius > 1.501) & (radius < 5.999)]
+        discretizer = results.study.cases[0].setup.discretizer
+        values = discretizer.values(fields[["x", "y"]].to_numpy(), reference[["x", "y"]].to_numpy())
+        difference = values @ fields[["u", "v"]].to_numpy() - reference[["u", "v"]].to_numpy()
+        size = np.linalg.norm(difference, axis=1) / TOOL_SPEED
+        print(
+            f"\norbit, n = {index}: {run['nodes']} nodes, {run['status']}; velocity within {100 * size.max():.2f} % "
+            f"of the tool speed (median {100 * np.median(size):.2f} %), "
+            f"drag {run['force_x']:.1f} N/mm, {100 * (run['force_x'] / drag - 1):+.2f} %"
+        )
+
+
+if __name__ == "__main__":
+    orders()
+    orbit()

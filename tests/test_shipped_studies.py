@@ -1,0 +1,39 @@
+"""Every shipped study, shrunk by its own [quick] section: it runs, its tables are full, its figures are drawn."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+import nlsolve
+
+STUDIES = Path(__file__).parent.parent / "studies"
+
+
+@pytest.mark.parametrize("path", sorted(STUDIES.rglob("*.toml")), ids=lambda path: path.stem)
+def test_runs_and_shows_what_it_declares(path, tmp_path):
+    results = nlsolve.run(path, tmp_path, quick=True)
+    assert results.notes == ()
+    assert set(results.runs["status"]) == {"converged"}
+    assert len(results.runs) == len(results.study.cases)
+    # 12 nodes around a tool whose layer is a fifth of their spacing: a field, but a coarse one.
+    assert results.runs["velocity_error"].between(0.0, 0.3).all()
+    assert (results.runs["residual_norm"] < 1e-5).all()
+    for spec in results.study.tables:
+        assert results.table(spec.name).notna().any(axis=1).all(), spec.name
+        assert {path.suffix for path in (tmp_path / "tables").glob(f"{spec.name}.*")} == {".csv", ".md", ".tex"}
+    for figure in results.study.figures:
+        assert (tmp_path / "figures" / f"{figure.name}.png").stat().st_size > 5000
+        assert (tmp_path / "figures" / f"{figure.name}.pdf").stat().st_size > 2000
+
+
+def test_equal_terms_are_equal(tmp_path):
+    """In the first study every method meets one residual, so all end in one field, whatever their work."""
+    runs = nlsolve.run(STUDIES / "first.toml", quick=True).runs
+    assert runs["velocity_error"].max() - runs["velocity_error"].min() < 1e-6
+    assert (runs["residual_norm"] <= 1e-8).all()
+    newton = runs[runs["solver.kind"] == "newton"].iloc[0]
+    assert newton["branches"] == newton["triangular_solves"] == newton["iterations"]
+    homotopy = runs[runs["solver.kind"] == "anm"]
+    assert (homotopy["triangular_solves"] % homotopy["solver.order"] == 0).all()
