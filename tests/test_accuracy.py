@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+import accuracy
 import numpy as np
 import pytest
 from cases import setup
@@ -40,13 +41,26 @@ class TestSteadySpinOnThePapersNodes:
 class TestSteadySpinOnGradedNodes:
     """At most 4500 nodes, 0.03 mm at the tool: below 0.6 % at n = 0.1324."""
 
-    nodes = GradedRings(first=0.03, growth=0.15)
+    nodes = GradedRings(first=0.03, growth=0.13, spacing=0.4)
     bound = 0.006
 
     def test_velocity(self) -> None:
         row = solved(StirringTool(nodes=self.nodes), 0.1324)
         assert row["nodes"] <= 4500
         assert row["velocity_error"] <= self.bound
+
+
+class TestOrbitAgainstIndependentFiniteElements:
+    """λ/μ = 1e4, at most 4500 nodes: velocity within 2 % of the tool speed off the walls, drag within 2 %."""
+
+    bound = 0.02
+
+    @pytest.mark.parametrize("index", accuracy.DRAG)
+    def test_velocity_and_drag(self, index: float) -> None:
+        comparison = accuracy.orbit_against_reference(index)
+        assert comparison.nodes <= 4500
+        assert comparison.velocity.max() <= self.bound
+        assert abs(comparison.drag / accuracy.DRAG[index] - 1.0) <= self.bound
 
 
 class TestOrderOfConvergence:

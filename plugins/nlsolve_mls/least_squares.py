@@ -46,10 +46,9 @@ class Supports:
                 Status.BAD_CLOUD, f"a support of {count} neighbours was asked for among {len(sources)} points"
             )
         distance, index = cKDTree(sources).query(targets, count + 1)
-        return cls(
-            index[:, :count],
-            np.maximum(0.5 * (distance[:, count - 1] + distance[:, count]), 1.001 * distance[:, count - 1]),
-        )
+        farthest, next_one = distance[:, count - 1], distance[:, count]
+        # On a regular grid the two tie, and a source on the rim would weigh nothing: the rim lies just beyond it.
+        return cls(index[:, :count], np.maximum(0.5 * (farthest + next_one), 1.001 * farthest))
 
     @classmethod
     def within(cls, sources: np.ndarray, targets: np.ndarray, radius: float) -> Supports:
