@@ -75,6 +75,7 @@ class Outcome:
     steps: tuple[dict[str, Any], ...]
 
 
+@np.errstate(all="ignore")  # what is not finite becomes a status, not a warning
 def solve(
     problem: NonlinearProblem,
     solver: NonlinearSolver,
@@ -85,19 +86,6 @@ def solve(
     ledger: Ledger,
 ) -> Outcome:
     """Take steps of `solver` on `problem` from `start` until the stopping test, the budget or a failure ends it."""
-    with np.errstate(all="ignore"):  # what is not finite becomes a status, not a warning
-        return _solve(problem, solver, tangent, start, stop, budget, ledger)
-
-
-def _solve(
-    problem: NonlinearProblem,
-    solver: NonlinearSolver,
-    tangent: Tangent,
-    start: Array,
-    stop: StoppingTest,
-    budget: Budget,
-    ledger: Ledger,
-) -> Outcome:
     audited = Audited(problem, ledger)
     scale = problem.scale(start)
     before, rows = start, list[dict[str, Any]]()
