@@ -51,7 +51,7 @@ def power(x: Array, exponents: tuple[int, int], derivative: tuple[int, int]) -> 
 # Least squares.
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(
     st.integers(0, 10**6),
     st.sampled_from([1, 2, 3, 4]),
@@ -152,7 +152,7 @@ def test_the_check_of_discretizers_can_fail() -> None:
 
 
 @pytest.mark.parametrize("degree", [2, 3])
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=10)
 @given(seed=st.integers(0, 10**6))
 def test_operators_differentiate_polynomials_of_their_degree_exactly(degree: int, seed: int) -> None:
     """B on velocities x^i y^j, S on stresses x^i y^j, on jittered clouds."""
