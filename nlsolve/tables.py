@@ -107,7 +107,7 @@ class Table:
         frames = {self.spec.caption or self.spec.name: self.words}
         if self.comparison is not None and self.spec.paper is not None:
             frames[f"{self.spec.name}: measured ({self.spec.paper.source}) verdict"] = self.comparison
-        return frames
+        return {title: frame.rename(index=_word, columns=_word) for title, frame in frames.items()}
 
     def rich(self) -> list[RichTable]:
         """For a terminal."""
