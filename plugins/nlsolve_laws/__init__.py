@@ -5,9 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from nlsolve import Component, hookimpl
+from nlsolve_laws.carreau_yasuda import CarreauYasuda
+from nlsolve_laws.cross import Cross
+from nlsolve_laws.herschel_bulkley import Bingham, HerschelBulkley
+from nlsolve_laws.norton_hoff import NortonHoff
 from nlsolve_laws.power_law import PowerLaw
+from nlsolve_laws.sellars_tegart import SellarsTegart
 
 
 @hookimpl
 def nlsolve_components() -> Iterable[type[Component]]:
-    return [PowerLaw]
+    return [PowerLaw, NortonHoff, CarreauYasuda, Cross, HerschelBulkley, Bingham, SellarsTegart]

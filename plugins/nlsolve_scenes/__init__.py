@@ -6,9 +6,10 @@ from collections.abc import Iterable
 
 from nlsolve import Component, hookimpl
 from nlsolve_scenes.channel import Channel
+from nlsolve_scenes.couette import Couette
 from nlsolve_scenes.stirring_tool import StirringTool
 
 
 @hookimpl
 def nlsolve_components() -> Iterable[type[Component]]:
-    return [StirringTool, Channel]
+    return [StirringTool, Channel, Couette]
