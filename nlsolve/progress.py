@@ -7,7 +7,7 @@ from types import TracebackType
 from typing import Self
 
 from rich.console import Console
-from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+from rich.progress import BarColumn, Progress, TextColumn
 
 from nlsolve.runner import Event
 
@@ -22,7 +22,7 @@ class Watch:
         self.factorizations = 0
         self.read_back = 0
         self.begun = self.told = time.monotonic()
-        columns = (BarColumn(20), TextColumn("{task.description}", markup=False), TimeElapsedColumn())
+        columns = (BarColumn(8), TextColumn("{task.description}", markup=False))
         self.bar = Progress(*columns, console=console, disable=not console.is_terminal)
         self.task = self.bar.add_task("starting", total=None)
 
@@ -51,8 +51,11 @@ class Watch:
             self.console.print(words, markup=False, highlight=False, soft_wrap=True)
 
     def words(self, event: Event, done: float) -> str:
-        """case 3/16 (solver.order = 20), increment 12/1250, branch 3, 17 factorisations, 140 s left"""
-        words = [f"case {event.number}/{event.cases} ({event.case.label})"]
+        """case 3/16, increment 12/1250, branch 3, 17 factorisations, 140 s left (solver.order = 20)
+
+        The label comes last: a narrow terminal cuts it off, not the numbers.
+        """
+        words = [f"case {event.number}/{event.cases}"]
         if event.run is not None:
             words.append(f"{event.run['status']}{' before' if event.resumed else ''}")
         now = event.progress
@@ -62,4 +65,4 @@ class Watch:
         computed = done - self.read_back
         if computed > 0 and done < event.cases:
             words.append(f"{(time.monotonic() - self.begun) * (event.cases - done) / computed:.0f} s left")
-        return ", ".join(words)
+        return f"{', '.join(words)} ({event.case.label})"

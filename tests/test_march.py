@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+import agreement
 import numpy as np
 import pandas as pd
 import pytest
@@ -292,3 +293,12 @@ def test_channel_on_its_default_grid_converges() -> None:
     row = march(setup(Channel(), law=law)).summary
     assert row["status"] == "converged", row["message"]
     assert row["velocity_error"] < 1e-2
+
+
+@pytest.mark.slow
+def test_the_homotopy_agrees_with_newton_on_the_papers_nodes() -> None:
+    """1780 moving nodes, 20 increments: to 1e-6 mm/s at every node and increment."""
+    differences = agreement.largest_differences()
+    homotopy = next(values for name, values in differences.items() if name.startswith("anm"))
+    assert len(homotopy) == agreement.INCREMENTS
+    assert homotopy.max() < 1e-6
