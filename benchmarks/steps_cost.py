@@ -47,9 +47,11 @@ def measure(volume_points: str, repeats: int) -> None:
     )
     setup = study.cases[0].setup
     scene, law, discretizer = setup.scene, setup.law, setup.discretizer
-    cloud = scene.cloud()
+    cloud = scene.cloud(law)
     operators = discretizer.operators(cloud, True)
-    flow = Flow(cloud, operators, law, scene.boundary_velocity(cloud, law, 0.0), scene.penalty_modulus(law))
+    flow = Flow(
+        cloud, operators, law, scene.boundary_velocity(cloud, law, 0.0), scene.penalty_modulus(law, np.zeros(1))
+    )
     exact = scene.exact(law, cloud.nodes, 0.0)
     assert exact is not None
     state = flow.unknowns(exact.velocity)

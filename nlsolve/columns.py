@@ -11,6 +11,7 @@ RUNS: dict[str, str] = {
     "increments": "time steps completed; 1 for a steady state",
     "time": "time reached [s]",
     "iterations": "iterations or series used by the method in all increments",
+    "pressure_iterations": "iterations of the pressure in all increments, where the scene asks for a divergence",
     "branches": "tangents K* factorised during the march (the 2015 paper's NIM)",
     "validity_time": "how long the first tangent of the march served [s]",
     "factorizations": "matrices factorised during the march",
@@ -32,7 +33,9 @@ RUNS: dict[str, str] = {
     "ordering": "column ordering the linear solver used",
     "fill": "entries stored in the last factors",
     "factor_solve_ratio": "measured time of one factorisation over one pair of triangular solves",
+    "condition": "estimate of ‖K*‖₁ ‖K*⁻¹‖₁ for the last tangent, where the linear solver can tell",
     "residual_norm": "largest relative residual accepted in any increment, asked for outside the method",
+    "divergence": "‖div V‖/‖ε̄‖ over volume points and strain points at the end, with a volumetric term",
     "velocity_error": "relative ℓ² error of the velocities of all nodes at the end, where there is an exact solution",
     "velocity_error_inside": "the same over the interior nodes alone, whose velocities are not given",
     "torque": "torque of the moving wall on the material per mm of thickness [N mm/mm]",
@@ -41,6 +44,18 @@ RUNS: dict[str, str] = {
     "force_y": "the same, y [N/mm]",
 }
 """`runs`: a row a case, whatever its ending. Behind these stand all parameters of the case, dotted ("solver.order")."""
+
+DIAGNOSTICS: dict[str, str] = {
+    "operator": "what the weights are for: strain, force, volume",
+    "targets": "places the weights belong to",
+    "smallest_support": "fewest neighbours of a place",
+    "largest_support": "most neighbours of a place",
+    "grown": "places whose support had to grow to become unisolvent and balanced",
+    "balance": "smallest ratio of the least to the largest singular value of a support's local system",
+    "reproduction_error": "largest error of derivatives of polynomials of the degree, scaled by the weights",
+    "largest_weight": "largest sum of |weights| times the distance of neighbours: amplification of rounding and noise",
+}
+"""`nlsolve diagnose`: a row an operator of a cloud."""
 
 STEPS: dict[str, str] = {
     "case": "identity of the case",

@@ -1,12 +1,16 @@
 """R(v) = … − S s(B v) − S_θ λ B_θ v : two pairs of sparse operators, the contract of discretizers.
 
     B     node velocities -> strain rates at M evaluation points            (3M, 2N)
-    S     stresses there  -> force density at the interior nodes            (2F, 3M)
+    S     stresses there  -> force at the interior nodes                    (2F, 3M)
     B_θ   node velocities -> dilatation rates at L volume points            (L, 2N)
-    S_θ   pressures there -> force density at the interior nodes            (2F, L)
+    S_θ   pressures there -> force at the interior nodes                    (2F, L)
 
 N nodes, F of them interior. Velocities are node-major (u_0, v_0, u_1, v_1, …); strain rates and stresses are in three
 blocks xx, yy, xy of length M. Evaluation points at the nodes give the composed form, between them stress points.
+
+A strong form gives forces per volume [N/mm³]. A conservative form gives the forces on the material around each node
+per thickness [N/mm], S = −Bᵀ A with the areas A of the evaluation points (xy counted twice), and S_θ = −B_θᵀ A_θ:
+R is then the gradient of the dissipation potential, its tangent symmetric, and `node_areas` W weigh the other terms.
 """
 
 from __future__ import annotations
@@ -22,7 +26,11 @@ from nlsolve.series import Array
 
 @dataclass(frozen=True)
 class Operators:
-    """The operators of one cloud. `dilatation` and `pressure_force` are None when no volumetric term was asked for."""
+    """The operators of one cloud.
+
+    dilatation, pressure_force, volume_points : None when no volumetric term was asked for.
+    node_areas : W (F,) [mm²] of a conservative form; None for forces per volume.
+    """
 
     strain: Any
     force: Any
@@ -30,6 +38,7 @@ class Operators:
     dilatation: Any = None
     pressure_force: Any = None
     volume_points: Array | None = None
+    node_areas: Array | None = None
 
 
 class Discretizer(Component, ABC):
@@ -42,5 +51,13 @@ class Discretizer(Component, ABC):
         """B, S and, when `volumetric`, B_θ, S_θ. Raises SolveError (bad cloud) naming the place where supports fail."""
 
     @abstractmethod
+    def gradient(self, cloud: Cloud) -> tuple[Any, Any]:
+        """Sparse (N, N) matrices of ∂/∂x and ∂/∂y at the nodes, for what is not a stress: convection, measures."""
+
+    @abstractmethod
     def values(self, sources: Array, targets: Array) -> Any:
         """Sparse (T, N) matrix taking values at `sources` (N, 2) to values at `targets` (T, 2)."""
+
+    def diagnostics(self, cloud: Cloud) -> list[dict[str, Any]]:
+        """How good the operators of a cloud are, a row an operator (columns of `nlsolve.columns.DIAGNOSTICS`)."""
+        return []

@@ -1,6 +1,7 @@
-"""R(v) = ρ (v − v_k)/Δt − S s(B v) − S_θ λ B_θ v − f : the discrete balance of momentum at the interior nodes.
+"""R(v) = W ρ ((v − v_k)/Δt + (v·∇) v) − S s(B v) − S_θ (λ B_θ v − p) − W f : the discrete balance of momentum.
 
-Terms that the scene leaves out are absent, not zero. The same formula runs on arrays and on series.
+It holds at the interior nodes; W are the areas of their material in a conservative form, 1 in a strong one. Terms that
+the scene leaves out are absent, not zero. The same formula runs on arrays and on series.
 """
 
 from __future__ import annotations
@@ -26,14 +27,24 @@ class Inertia:
     previous: Array
 
 
+@dataclass(frozen=True)
+class Convection:
+    """ρ [t/mm³] and the (N, N) matrices of ∂/∂x and ∂/∂y at the nodes."""
+
+    density: float
+    gradient: tuple[Any, Any]
+
+
 class Flow(NonlinearProblem):
-    """R(u) = 0 for u, the velocities (u_0, v_0, u_1, …) of the interior nodes, shape (2F,) [mm/s]; R in [N/mm³].
+    """R(u) = 0 for u, the velocities (u_0, v_0, u_1, …) of the interior nodes, shape (2F,) [mm/s]; R in [N/mm³], or in
+    [N/mm] when the operators are a conservative form.
 
     cloud, operators : the nodes and their B, S, B_θ, S_θ.
     law : s(ε̇) = 2 μ(ε̄²) ε̇.
     boundary_velocity : prescribed velocities of the boundary nodes, shape (N − F, 2).
-    penalty_modulus : λ [MPa s]; the volumetric term is present when the operators have one.
-    inertia, body_force : present when given; f at the interior nodes, shape (F, 2).
+    penalty_modulus : λ [MPa s], one or (L,); the volumetric term is present when the operators have one.
+    pressure : p at the volume points, shape (L,) [MPa], for the iterated penalty.
+    inertia, convection, body_force : present when given; f at the interior nodes, shape (F, 2) [N/mm³].
     """
 
     def __init__(
@@ -42,11 +53,14 @@ class Flow(NonlinearProblem):
         operators: Operators,
         law: ConstitutiveLaw,
         boundary_velocity: Array,
-        penalty_modulus: float = 0.0,
+        penalty_modulus: float | Array = 0.0,
+        pressure: Array | None = None,
         inertia: Inertia | None = None,
+        convection: Convection | None = None,
         body_force: Array | None = None,
     ) -> None:
         self.cloud, self.operators, self.law = cloud, operators, law
+        self.is_gradient = operators.node_areas is not None and convection is None
         self._free = node_major(cloud.interior)
         lifted = np.zeros(2 * len(cloud.nodes))
         lifted[node_major(cloud.boundary)] = boundary_velocity.ravel()
@@ -56,22 +70,30 @@ class Flow(NonlinearProblem):
         self._force = operators.force
         self._gradient: Any = None
         self._dilatation: Any = None
-        self._inertia = 0.0
+        self._inertia: Any = None
+        self._carried: _Carried | None = None
+        areas = 1.0 if operators.node_areas is None else np.repeat(operators.node_areas, 2)
         constant = np.zeros(len(self._free))
-        if operators.dilatation is not None and penalty_modulus > 0.0:
-            self._gradient = -penalty_modulus * operators.pressure_force
+        self._modulus: Array | None = None
+        self._pressure: Array | float = 0.0 if pressure is None else pressure
+        if operators.dilatation is not None and np.max(penalty_modulus) > 0.0:
+            self._modulus = np.broadcast_to(penalty_modulus, operators.dilatation.shape[0])
+            self._gradient = -operators.pressure_force @ sp.diags_array(self._modulus)
             self._dilatation = operators.dilatation[:, self._free]
             constant += self._gradient @ (operators.dilatation @ lifted)
+            if pressure is not None:
+                constant += operators.pressure_force @ pressure
         if inertia is not None:
-            self._inertia = inertia.density_over_increment
+            self._inertia = areas * np.full(len(self._free), inertia.density_over_increment)
             constant -= self._inertia * inertia.previous[cloud.interior].ravel()
+        if convection is not None:
+            self._carried = _Carried(convection, cloud, areas * np.ones(len(self._free)), lifted)
         if body_force is not None:
-            constant -= body_force.ravel()
+            constant -= areas * body_force.ravel()
         self._constant = constant
-        self._pressure_modulus = penalty_modulus
 
     def residual(self, u: Array) -> Array:
-        """R(u) [N/mm³]."""
+        """R(u)."""
         return self._balance(u)
 
     def expand(self, u: Array) -> Expansion:
@@ -83,15 +105,17 @@ class Flow(NonlinearProblem):
         balance = self._constant - self._force @ stress(self.law, self._strain_rate(u)).reshape(-1)
         if self._gradient is not None:
             balance = balance + self._gradient @ (self._dilatation @ u)
-        if self._inertia:
+        if self._inertia is not None:
             balance = balance + self._inertia * u
+        if self._carried is not None:
+            balance = balance + self._carried.force(u)
         return balance
 
     def _strain_rate(self, u: Number) -> Number:
         return (self._strain @ u + self._strain_boundary).reshape(3, -1)
 
     def jacobian(self, u: Array) -> Any:
-        """J = ρ/Δt − S C B − S_θ λ B_θ with the pointwise moduli C (3, 3, M) of the law."""
+        """J = W ρ (1/Δt + ∂(v·∇ v)/∂v) − S C B − S_θ λ B_θ with the pointwise moduli C (3, 3, M) of the law."""
         moduli = tangent_moduli(self.law, self._strain_rate(u))
         points = moduli.shape[2]
         # C as a sparse matrix with three entries a row: row a M + m holds columns m, M + m, 2 M + m.
@@ -107,16 +131,22 @@ class Flow(NonlinearProblem):
         jacobian = -(self._force @ (pointwise @ self._strain))
         if self._gradient is not None:
             jacobian = jacobian + self._gradient @ self._dilatation
-        if self._inertia:
-            jacobian = jacobian + self._inertia * sp.eye_array(jacobian.shape[0], format="csr")
+        if self._inertia is not None:
+            jacobian = jacobian + sp.diags_array(self._inertia)
+        if self._carried is not None:
+            jacobian = jacobian + self._carried.tangent(u)
         return jacobian
 
     def scale(self, u: Array) -> float:
-        """‖|S| |s| + |S_θ λ| |B_θ v| + ρ/Δt |u| + |constant|‖₂: the size of the forces that cancel in R(u)."""
+        """‖|S| |s| + |S_θ λ| |B_θ v| + W ρ |v/Δt + v·∇ v| + |constant|‖₂: the size of the forces that cancel in R."""
         terms = abs(self._force) @ np.abs(stress(self.law, self._strain_rate(u))).ravel() + np.abs(self._constant)
         if self._gradient is not None:
             terms += abs(self._gradient) @ np.abs(self._dilatation @ u)
-        return float(np.linalg.norm(terms + self._inertia * np.abs(u))) or 1.0
+        if self._inertia is not None:
+            terms += self._inertia * np.abs(u)
+        if self._carried is not None:
+            terms += np.abs(self._carried.force(u))
+        return float(np.linalg.norm(terms)) or 1.0
 
     def velocity(self, u: Array) -> Array:
         """Velocities of all nodes, boundary included, shape (N, 2) [mm/s]."""
@@ -132,11 +162,40 @@ class Flow(NonlinearProblem):
         """s at the evaluation points, shape (3, M) [MPa]."""
         return stress(self.law, self._strain_rate(u))
 
-    def pressure_stress(self, u: Array) -> Array | None:
-        """λ tr ε̇ at the volume points, shape (L,) [MPa]; None without a volumetric term."""
-        if self.operators.dilatation is None or not self._pressure_modulus:
-            return None
-        return self._pressure_modulus * (self.operators.dilatation @ self.velocity(u).ravel())
+    def dilatation_rate(self, u: Array) -> Array | None:
+        """tr ε̇ = div v at the volume points, shape (L,) [1/s]; None without a volumetric term."""
+        return None if self._modulus is None else self.operators.dilatation @ self.velocity(u).ravel()
+
+    def pressure(self, u: Array) -> Array | None:
+        """p − λ tr ε̇ at the volume points, shape (L,) [MPa], the next p of an iterated penalty; None without one."""
+        rate = self.dilatation_rate(u)
+        return None if rate is None or self._modulus is None else self._pressure - self._modulus * rate
+
+
+class _Carried:
+    """W ρ (v·∇) v at the interior nodes, (2F,), of interior velocities u (2F,), and its tangent."""
+
+    def __init__(self, convection: Convection, cloud: Cloud, areas: Array, lifted: Array) -> None:
+        inside, free = cloud.interior, node_major(cloud.interior)
+        self._terms = []
+        for axis, derivative in enumerate(convection.gradient):
+            # Rows node-major: ∂/∂x (or ∂/∂y) of u_i, then of v_i; beside it u_i (or v_i), the speed that carries both.
+            rows = sp.kron(sp.csr_array(derivative)[inside], sp.eye_array(2), format="csr")
+            speed = sp.kron(
+                sp.eye_array(len(inside)), sp.csr_array([[1.0 - axis, axis], [1.0 - axis, axis]]), format="csr"
+            )
+            weight = sp.diags_array(convection.density * areas)
+            self._terms.append((weight @ rows[:, free], weight @ (rows @ lifted), speed))
+
+    def force(self, u: Number) -> Number:
+        (x, x_0, speed_x), (y, y_0, speed_y) = self._terms
+        return (speed_x @ u) * (x @ u + x_0) + (speed_y @ u) * (y @ u + y_0)
+
+    def tangent(self, u: Array) -> Any:
+        return sum(
+            sp.diags_array(slope @ u + slope_0) @ speed + sp.diags_array(speed @ u) @ slope
+            for slope, slope_0, speed in self._terms
+        )
 
 
 def node_major(nodes: Any) -> Any:

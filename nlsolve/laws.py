@@ -69,6 +69,12 @@ def tangent_moduli(law: ConstitutiveLaw, strain_rate: Array) -> Any:
     return moduli
 
 
+def local_index(law: ConstitutiveLaw, rate: float) -> float:
+    """n = d log τ/d log γ̇ at ε̄ = rate [1/s]: the index of the power law that this law is like there."""
+    viscosity = law.viscosity(Series.seed(np.array([rate**2])))
+    return float(1.0 + 2.0 * rate**2 * viscosity.coefficient(1)[0] / viscosity.coefficient(0)[0])
+
+
 CONTRACTION = np.array([1.0, 1.0, 2.0])
 """w in ε̇:ε̇ = w · (ε̇xx², ε̇yy², ε̇xy²)."""
 

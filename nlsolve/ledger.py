@@ -162,4 +162,6 @@ def _view(problem: NonlinearProblem, ledger: Ledger, remember: Any) -> Nonlinear
             with ledger.entry("residual"):  # it costs what a residual costs
                 return problem.scale(u)
 
-    return CountedProblem()
+    view = CountedProblem()
+    view.is_gradient = problem.is_gradient
+    return view

@@ -25,6 +25,10 @@ class Factors(ABC):
     def solve(self, rhs: Array) -> Array:
         """x with A x = rhs: one forward and one backward triangular solve, nothing hidden."""
 
+    def condition(self) -> float | None:
+        """An estimate of ‖A‖₁ ‖A⁻¹‖₁, asked for off the clock; None when the library gives no transposed solves."""
+        return None
+
 
 class LinearSolver(Component, ABC):
     """Factorises sparse matrices. Iterative refinement is asked for here and carried out, and counted, outside."""

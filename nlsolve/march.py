@@ -4,22 +4,23 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, ClassVar
 
 import numpy as np
 import pandas as pd
 from pydantic import Field
+from scipy.spatial import cKDTree
 
 from nlsolve.columns import STEPS
 from nlsolve.component import Component
 from nlsolve.discretizers import Discretizer, Operators
 from nlsolve.driver import Budget, Outcome, StoppingTest, solve
-from nlsolve.flow import Flow, Inertia
-from nlsolve.laws import ConstitutiveLaw
+from nlsolve.flow import Convection, Flow, Inertia
+from nlsolve.laws import ConstitutiveLaw, rate_squared
 from nlsolve.ledger import Ledger
 from nlsolve.linear import LinearSolver
-from nlsolve.measures import nodal_fields, velocity_error, wall_reaction
+from nlsolve.measures import divergence, nodal_fields, velocity_error, wall_reaction
 from nlsolve.scenes import Scene
 from nlsolve.series import Array
 from nlsolve.solvers import NonlinearSolver, RefreshRule
@@ -101,6 +102,8 @@ class _March:
         self.increments = self.iterations = 0
         self.validity_time: float | None = None
         self.residual_norm = float("nan")
+        self.pressure: Array | None = None  # at the volume points, iterated where the scene asks for a divergence
+        self.pressure_iterations = 0
         self.sizes: dict[str, int | None] = {"nodes": None, "unknowns": None}
         self.operators: Operators
         self.flow: Flow | None = None  # of the last solved increment
@@ -123,7 +126,7 @@ class _March:
 
     def begin(self) -> None:
         """The cloud at t = 0, its operators, and rest inside."""
-        self.initial = self.cloud = self.scene.cloud()
+        self.initial = self.cloud = self.scene.cloud(self.setup.law)
         self.sizes = {"nodes": len(self.cloud.nodes), "unknowns": 2 * len(self.cloud.interior)}
         self.build_operators()
         self.velocity = np.zeros_like(self.cloud.nodes)
@@ -139,17 +142,19 @@ class _March:
         *easier, target = self.setup.law.continuation(self.setup.start.by, self.setup.start.values)
         begun = time.perf_counter()
         outcome = None
-        for law in easier if self.scene.increments == 0 else [*easier, target]:
+        for law in easier:
             outcome = self.start_stage(law)
             if outcome.status is not Status.CONVERGED:
                 break
+        if self.scene.increments and (outcome is None or outcome.status is Status.CONVERGED):
+            outcome = self.iterate_pressure(lambda: self.start_stage(target))
         self.seconds_start = time.perf_counter() - begun
         self.tangent = Tangent(self.setup.linear, self.setup.refresh, self.ledger, self.start_tangent.factors)
         if outcome is not None and outcome.status is not Status.CONVERGED:
             detail = f"on the way to the first state: {outcome.detail}"
             return Outcome(outcome.status, detail, outcome.state, outcome.residual_norm, ())
         if self.scene.increments == 0:
-            outcome = self.solve_increment(0, self.flow_of(target))
+            outcome = self.iterate_pressure(lambda: self.solve_increment(0, self.flow_of(target)))
         assert outcome is not None
         if outcome.status is Status.CONVERGED:
             self.record_fields_if_due()
@@ -181,7 +186,7 @@ class _March:
         inertia = None
         if self.scene.inertia:
             inertia = Inertia(self.scene.density / self.scene.increment, previous)
-        outcome = self.solve_increment(k, self.flow_of(self.setup.law, inertia))
+        outcome = self.iterate_pressure(lambda: self.solve_increment(k, self.flow_of(self.setup.law, inertia)))
         self.before = previous
         if outcome.status is Status.CONVERGED:
             self.record_fields_if_due()
@@ -195,8 +200,13 @@ class _March:
         self.cloud = self.cloud.moved_to(nodes)
 
     def build_operators(self) -> None:
+        before = self.operators.volume_points if self.pressure is not None else None
         with self.ledger.entry("operators"):
             self.operators = self.setup.discretizer.operators(self.cloud, self.volumetric)
+            self.gradient = self.setup.discretizer.gradient(self.cloud) if self.scene.convection else None
+        if before is not None:
+            assert self.operators.volume_points is not None
+            self.pressure = self.setup.discretizer.values(before, self.operators.volume_points) @ self.pressure
 
     def flow_of(self, law: ConstitutiveLaw, inertia: Inertia | None = None) -> Flow:
         return Flow(
@@ -204,10 +214,44 @@ class _March:
             self.operators,
             law,
             self.scene.boundary_velocity(self.cloud, law, self.time),
-            self.scene.penalty_modulus(law) if self.volumetric else 0.0,
+            self.scene.penalty_modulus(law, self.rate_squared_at_volume_points()) if self.volumetric else 0.0,
+            self.pressure,
             inertia,
+            Convection(self.scene.density, self.gradient) if self.gradient is not None else None,
             self.scene.body_force(self.cloud.nodes[self.cloud.interior], law),
         )
+
+    def rate_squared_at_volume_points(self) -> Array:
+        """ε̄² of the velocity so far, taken at the strain point nearest to each volume point, shape (L,)."""
+        nearest = cKDTree(self.operators.strain_points).query(self.operators.volume_points)[1]
+        return rate_squared((self.operators.strain @ self.velocity.ravel()).reshape(3, -1)[:, nearest])
+
+    def iterate_pressure(self, solve_once: Callable[[], Outcome]) -> Outcome:
+        """p ← p − λ div v after each solve until ‖div v‖ ≤ divergence · ‖ε̄‖ (augmented Lagrangian); once without one.
+
+        Powell (1969), Hestenes (1969); for viscous flow Fortin & Glowinski (1983).
+        """
+        asked, most = self.scene.divergence, self.setup.budget.pressures
+        outcome = solve_once()
+        if asked is None:
+            return outcome
+        for _ in range(most):
+            if outcome.status is not Status.CONVERGED:
+                return outcome
+            assert self.flow is not None
+            if divergence(self.flow, self.velocity) <= asked:
+                return outcome
+            self.pressure = self.flow.pressure(outcome.state)
+            self.pressure_iterations += 1
+            outcome = solve_once()
+        reached = divergence(self.flow, self.velocity) if self.flow is not None else np.nan
+        if outcome.status is not Status.CONVERGED or reached <= asked:
+            return outcome
+        detail = (
+            f"‖div V‖/‖ε̄‖ = {reached:.1e} after {most} iterations of the pressure, {asked:g} was asked for: "
+            "raise the penalty, or tighten stop.tolerance"
+        )
+        return replace(outcome, status=Status.BUDGET_SPENT, detail=detail)
 
     def solve_increment(self, k: int, flow: Flow) -> Outcome:
         """The case's own method on one increment; its rows, counts and largest residual are kept."""
@@ -267,6 +311,7 @@ class _March:
             "increments": self.increments,
             "time": reached,
             "iterations": self.iterations,
+            "pressure_iterations": self.pressure_iterations if self.scene.divergence else None,
             "branches": self.tangent.branches,
             "validity_time": validity,
             "factorizations": ledger.counts["factorization"],
@@ -288,9 +333,11 @@ class _March:
             "ordering": factors.ordering if factors else None,
             "fill": factors.fill if factors else None,
             "factor_solve_ratio": ledger.each("factorization") / ledger.each("triangular_solve"),
+            "condition": factors.condition() if factors else None,
             "residual_norm": self.residual_norm,
         }
         if self.flow is not None:
+            summary["divergence"] = divergence(self.flow, self.velocity)
             summary |= velocity_error(self.scene, self.flow, self.velocity, reached)
             summary |= wall_reaction(self.scene, self.setup.discretizer, self.flow, self.velocity, reached)
         steps = pd.DataFrame(self.rows, columns=[name for name in STEPS if name != "case"])

@@ -28,6 +28,15 @@ def _relative(value: Array, exact: Array) -> float:
     return float(np.linalg.norm(value - exact) / np.linalg.norm(exact))
 
 
+def divergence(flow: Flow, velocity: Array) -> float:
+    """‖div v‖/‖ε̄‖, root mean squares over the volume points and the strain points; NaN without a volumetric term."""
+    dilatation = flow.dilatation_rate(flow.unknowns(velocity))
+    if dilatation is None:
+        return float("nan")
+    squared = rate_squared((flow.operators.strain @ velocity.ravel()).reshape(3, -1))
+    return float(np.sqrt(np.mean(dilatation**2) / np.mean(squared)))
+
+
 def wall_reaction(scene: Scene, discretizer: Discretizer, flow: Flow, velocity: Array, time: float) -> dict[str, float]:
     """Force −∮ σ n ds and torque −∮ x × σ n ds of the moving wall on the material; empty without a contour.
 
@@ -43,10 +52,10 @@ def wall_reaction(scene: Scene, discretizer: Discretizer, flow: Flow, velocity: 
     u = flow.unknowns(velocity)
     values = discretizer.values(flow.operators.strain_points, middles)
     xx, yy, xy = (values @ component for component in flow.stress_at_points(u))
-    pressure = flow.pressure_stress(u)
+    pressure = flow.pressure(u)
     if pressure is not None and flow.operators.volume_points is not None:
         volumetric = discretizer.values(flow.operators.volume_points, middles) @ pressure
-        xx, yy = xx + volumetric, yy + volumetric
+        xx, yy = xx - volumetric, yy - volumetric
     traction = np.stack([xx * n_ds[:, 0] + xy * n_ds[:, 1], xy * n_ds[:, 0] + yy * n_ds[:, 1]], axis=1)
     force_x, force_y = -traction.sum(axis=0)
     torque = -float((middles[:, 0] * traction[:, 1] - middles[:, 1] * traction[:, 0]).sum())

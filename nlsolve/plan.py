@@ -29,7 +29,7 @@ def forecast(study: Study) -> pd.DataFrame:
     rows = []
     for case in study.cases:
         setup = case.setup
-        key = "".join(part.model_dump_json() for part in (setup.scene, setup.discretizer, setup.linear))
+        key = "".join(part.model_dump_json() for part in (setup.scene, setup.law, setup.discretizer, setup.linear))
         if key not in measured:
             measured[key] = sample(setup)
         costs = measured[key]
@@ -51,7 +51,7 @@ def forecast(study: Study) -> pd.DataFrame:
 def sample(setup: Setup) -> dict[str, float]:
     """Sizes and timings [s] of one scene with the operators' own matrix S·2B; all NaN when the cloud is bad."""
     try:
-        cloud = setup.scene.cloud()
+        cloud = setup.scene.cloud(setup.law)
         operators, seconds_operators = _timed(lambda: setup.discretizer.operators(cloud, bool(setup.scene.penalty)))
         inside = np.stack([2 * cloud.interior, 2 * cloud.interior + 1], axis=1).ravel()
         matrix = (operators.force @ (2.0 * operators.strain.tocsc()[:, inside])).tocsc()

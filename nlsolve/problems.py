@@ -33,6 +33,9 @@ class Expansion:
 class NonlinearProblem(ABC):
     """R(u) = 0 for u of shape (U,)."""
 
+    is_gradient: bool = False
+    """True when R is the gradient of a convex potential, so that R(u + t w)·w grows with t for every direction w."""
+
     @abstractmethod
     def residual(self, u: Array) -> Array:
         """R(u), shape (U,)."""

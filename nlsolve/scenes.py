@@ -1,8 +1,9 @@
 """Where the material is, what moves it, and which terms the balance of momentum needs: the contract of scenes.
 
-    ρ dV/dt = div σ + f,     σ = λ tr(ε̇) I + S(ε̇)
+    ρ (∂V/∂t + (V·∇) V) = div σ + f,     σ = (λ tr(ε̇) − p) I + S(ε̇)
 
-Inertia, the penalty λ and the motion of nodes are present only when the scene switches them on.
+Inertia, convection, the penalty λ, the iterated pressure p and the motion of nodes are present only when the scene
+switches them on.
 """
 
 from __future__ import annotations
@@ -11,11 +12,11 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import ClassVar, Literal
+from typing import ClassVar, Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field
+from pydantic import Field, model_validator
 from scipy.spatial import cKDTree
 
 from nlsolve.component import Component
@@ -96,13 +97,33 @@ class Scene(Component, ABC):
     increment: float = Field(1e-4, gt=0, description="time step of the march [s]")
     density: float = Field(2.81e-9, gt=0, description="mass density [t/mm³]")
     inertia: bool = Field(False, description="keep the term ρ (V − V_k)/Δt")
-    penalty: float | None = Field(
-        None, ge=0, description="λ/μ at the reference strain rate; absent: no volumetric term"
+    convection: bool = Field(False, description="keep the term ρ (V·∇) V; for fixed nodes only")
+    penalty: float | None = Field(None, ge=0, description="λ, in the unit of penalty_unit; absent: no volumetric term")
+    penalty_unit: Literal["reference", "local", "absolute"] = Field(
+        "reference",
+        description="λ is a multiple of μ at the reference strain rate, of μ where it acts, or given in MPa s",
+    )
+    divergence: float | None = Field(
+        None,
+        gt=0,
+        description="‖div V‖/‖ε̄‖ to be reached by iterating the pressure (augmented Lagrangian); absent: penalty alone",
     )
     motion_of_nodes: Literal["fixed", "lagrangian"] = Field(
         "fixed", description="nodes stay, or move with the material"
     )
     probe: tuple[float, float] | None = Field(None, description="place whose nearest node is recorded in time [mm]")
+
+    @model_validator(mode="after")
+    def _terms_fit_together(self) -> Self:
+        if self.divergence is not None and not self.penalty:
+            raise ValueError(
+                f"divergence = {self.divergence:g}: the pressure is iterated with a penalty; set penalty > 0"
+            )
+        if self.convection and self.motion_of_nodes == "lagrangian":
+            raise ValueError(
+                'convection = true: nodes that move with the material carry it already; use motion_of_nodes = "fixed"'
+            )
+        return self
 
     @property
     def increments(self) -> int:
@@ -114,15 +135,21 @@ class Scene(Component, ABC):
     def reference_rate(self) -> float:
         """Strain rate ε̄ [1/s] at which `penalty` and continuation compare viscosities."""
 
-    def penalty_modulus(self, law: ConstitutiveLaw) -> float:
-        """λ = penalty · μ(reference rate) [MPa s]; 0 without a penalty."""
+    def penalty_modulus(self, law: ConstitutiveLaw, rate_squared: Array) -> float | Array:
+        """λ [MPa s]: penalty · μ at the reference rate, or penalty · μ(ε̄²) with the `rate_squared` (L,) of the volume
+        points, or the penalty itself; 0 without a penalty.
+        """
         if not self.penalty:
             return 0.0
+        if self.penalty_unit == "absolute":
+            return self.penalty
+        if self.penalty_unit == "local":
+            return self.penalty * law.viscosity(rate_squared)
         return self.penalty * float(law.viscosity(np.array([self.reference_rate**2]))[0])
 
     @abstractmethod
-    def cloud(self) -> Cloud:
-        """The nodes at t = 0."""
+    def cloud(self, law: ConstitutiveLaw) -> Cloud:
+        """The nodes at t = 0; they may be graded to the layers this law makes."""
 
     @abstractmethod
     def boundary_position(self, cloud: Cloud, time: float) -> Array:

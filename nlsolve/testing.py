@@ -128,7 +128,7 @@ def check_scene(scene: Scene, law: ConstitutiveLaw) -> None:
     """A cloud with an inside and boundary groups that share no node; boundary nodes that start where they are; shapes;
     an exact velocity, where there is one, that agrees with the prescribed one.
     """
-    cloud = scene.cloud()  # raises for coincident nodes
+    cloud = scene.cloud(law)  # raises for coincident nodes
     members = np.concatenate([np.asarray(group) for group in cloud.boundaries.values()])
     _require(len(np.unique(members)) == len(members), "a node belongs to two boundary groups")
     _require(((members >= 0) & (members < len(cloud.nodes))).all(), "a boundary group names a node that does not exist")

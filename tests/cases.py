@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
+from nlsolve_collocation import MovingLeastSquares
 from nlsolve_laws import PowerLaw
-from nlsolve_mls import MovingLeastSquares
 from nlsolve_newton import Newton
 from nlsolve_refresh import EveryIteration
 from nlsolve_scenes import StirringTool
@@ -26,7 +26,8 @@ PLAIN = SuperLU(ordering="mmd-ata")  # no trials of orderings in the counts
 def spin_flow(index: float, spacing: float = 0.75, regularization: float = 1e-2) -> Flow:
     """The steady spin on coarse rings."""
     scene = StirringTool(nodes=Rings(spacing=spacing))
-    law, cloud = PowerLaw(index=index, regularization=regularization), scene.cloud()
+    law = PowerLaw(index=index, regularization=regularization)
+    cloud = scene.cloud(law)
     operators = MovingLeastSquares().operators(cloud, False)
     return Flow(cloud, operators, law, scene.boundary_velocity(cloud, law, 0.0))
 

@@ -55,7 +55,7 @@ class Box(Scene):
     def reference_rate(self) -> float:
         return 1.0
 
-    def cloud(self) -> Cloud:
+    def cloud(self, law: ConstitutiveLaw) -> Cloud:
         return Cloud(np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [0.3, 0.3]]), {"wall": np.array([0, 1, 2])})
 
     def boundary_position(self, cloud: Cloud, time: float) -> Any:
@@ -84,6 +84,9 @@ class Grid(Discretizer):
     def operators(self, cloud: Cloud, volumetric: bool) -> Operators:
         strain = csc_array(np.eye(6, 8, 2))
         return Operators(strain, csc_array(np.eye(2, 6, 4)), cloud.nodes[:2])
+
+    def gradient(self, cloud: Cloud) -> tuple[Any, Any]:
+        return csc_array((4, 4)), csc_array((4, 4))
 
     def values(self, sources: Any, targets: Any) -> Any:
         return csc_array((len(targets), len(sources)))

@@ -8,8 +8,8 @@ import accuracy
 import numpy as np
 import pytest
 from cases import setup
+from nlsolve_collocation import MovingLeastSquares
 from nlsolve_laws import PowerLaw
-from nlsolve_mls import MovingLeastSquares
 from nlsolve_scenes import Channel, StirringTool
 from nlsolve_scenes.rings import GradedRings, Rings
 from nlsolve_superlu import SuperLU

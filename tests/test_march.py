@@ -9,9 +9,9 @@ import numpy as np
 import pandas as pd
 import pytest
 from cases import setup
+from nlsolve_collocation import MovingLeastSquares
 from nlsolve_homotopy import AsymptoticNumericalMethod
 from nlsolve_laws import PowerLaw
-from nlsolve_mls import MovingLeastSquares
 from nlsolve_newton import ModifiedNewton, Newton
 from nlsolve_refresh import EveryIteration, EveryM, Never, PoorContraction, RangeUnderOne
 from nlsolve_scenes import Channel, StirringTool

@@ -9,10 +9,10 @@ import pytest
 import scipy.sparse as sp
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from nlsolve_collocation import MovingLeastSquares
+from nlsolve_collocation.least_squares import Supports, monomials, weight_function, weights
+from nlsolve_collocation.triangles import Triangles
 from nlsolve_laws import PowerLaw
-from nlsolve_mls import MovingLeastSquares
-from nlsolve_mls.least_squares import Supports, monomials, weight_function, weights
-from nlsolve_mls.triangles import Triangles
 from nlsolve_scenes import Channel, StirringTool
 from nlsolve_scenes.rings import GradedRings, Rings
 from pydantic import ValidationError
@@ -24,10 +24,10 @@ from nlsolve.series import Array
 from nlsolve.testing import check_discretizer
 
 CLOUDS = {
-    "rings": StirringTool(nodes=Rings(spacing=0.5)).cloud(),
-    "graded": StirringTool(nodes=GradedRings(first=0.15, growth=0.2, spacing=0.5)).cloud(),
-    "grid": Channel(spacing=0.2).cloud(),
-    "jittered": Channel(spacing=0.2, jitter=0.3, seed=2).cloud(),
+    "rings": StirringTool(nodes=Rings(spacing=0.5)).cloud(PowerLaw()),
+    "graded": StirringTool(nodes=GradedRings(first=0.15, growth=0.2, spacing=0.5)).cloud(PowerLaw()),
+    "grid": Channel(spacing=0.2).cloud(PowerLaw()),
+    "jittered": Channel(spacing=0.2, jitter=0.3, seed=2).cloud(PowerLaw()),
 }
 
 
@@ -156,7 +156,7 @@ def test_the_check_of_discretizers_can_fail() -> None:
 @given(seed=st.integers(0, 10**6))
 def test_operators_differentiate_polynomials_of_their_degree_exactly(degree: int, seed: int) -> None:
     """B on velocities x^i y^j, S on stresses x^i y^j, on jittered clouds."""
-    cloud = Channel(spacing=0.2, jitter=0.3, seed=seed).cloud()
+    cloud = Channel(spacing=0.2, jitter=0.3, seed=seed).cloud(PowerLaw())
     support = {2: 12, 3: 18}[degree]
     operators = MovingLeastSquares(degree=degree, support=support, force_support=support + 4).operators(cloud, False)
     nodes, points, inside = cloud.nodes, operators.strain_points, cloud.nodes[cloud.interior]
@@ -183,7 +183,7 @@ def eigenvalues(points: Any, seed: int) -> Array:
         Channel(spacing=0.25, jitter=0.2, seed=seed),
         PowerLaw(index=1.0, consistency=3.0, temperature_exponent=0.0),
     )
-    cloud = scene.cloud()
+    cloud = scene.cloud(PowerLaw())
     operators = MovingLeastSquares(points=points).operators(cloud, False)
     flow = Flow(cloud, operators, law, scene.boundary_velocity(cloud, law, 0.0))
     return np.linalg.eigvals(flow.jacobian(np.zeros(2 * len(cloud.interior))).toarray())
@@ -253,7 +253,7 @@ def test_volumetric_operators_are_adjoint(cloud: Cloud) -> None:
 
 
 def test_there_is_about_one_volume_point_a_node_and_far_more_strain_points() -> None:
-    cloud = StirringTool().cloud()
+    cloud = StirringTool().cloud(PowerLaw())
     operators = MovingLeastSquares().operators(cloud, True)
     assert operators.volume_points is not None
     assert 0.8 < len(operators.volume_points) / len(cloud.nodes) < 1.2

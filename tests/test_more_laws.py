@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+from nlsolve_collocation import MovingLeastSquares
 from nlsolve_laws import Bingham, CarreauYasuda, Cross, HerschelBulkley, NortonHoff, PowerLaw, SellarsTegart
-from nlsolve_mls import MovingLeastSquares
 from nlsolve_scenes import StirringTool
 from nlsolve_scenes.rings import Rings
 from pydantic import ValidationError
@@ -33,7 +33,7 @@ LAWS: dict[str, ConstitutiveLaw] = {
 }
 RATES = 10.0 ** np.arange(-2.0, 4.0)
 SCENE = StirringTool(nodes=Rings(spacing=0.75))
-CLOUD = SCENE.cloud()
+CLOUD = SCENE.cloud(PowerLaw())
 OPERATORS = MovingLeastSquares().operators(CLOUD, False)
 
 

@@ -54,7 +54,7 @@ def test_the_check_of_scenes_can_fail() -> None:
 
 def test_the_papers_node_set_has_1780_nodes() -> None:
     """Rings r = 1.5 + 0.25 i mm, i = 0 … 18, of floor(2πr/0.25) nodes."""
-    cloud = StirringTool().cloud()
+    cloud = StirringTool().cloud(PowerLaw())
     assert len(cloud.nodes) == 1780
     radii = np.unique(np.round(np.hypot(*cloud.nodes.T), 9))
     np.testing.assert_allclose(radii, 1.5 + 0.25 * np.arange(19))
@@ -72,7 +72,7 @@ def test_the_papers_node_set_has_1780_nodes() -> None:
     ],
 )
 def test_graded_rings_are_fine_at_the_tool_and_end_on_the_plate(nodes: GradedRings, count: int) -> None:
-    cloud = StirringTool(nodes=nodes).cloud()
+    cloud = StirringTool(nodes=nodes).cloud(PowerLaw())
     radii = np.unique(np.round(np.hypot(*cloud.nodes.T), 9))
     gaps = np.diff(radii)
     assert len(cloud.nodes) == count
@@ -86,12 +86,12 @@ def test_graded_rings_are_fine_at_the_tool_and_end_on_the_plate(nodes: GradedRin
 
 
 def test_channel_nodes_fill_the_rectangle_and_only_inner_ones_are_jittered() -> None:
-    plain, shaken = Channel(spacing=0.2).cloud(), Channel(spacing=0.2, jitter=0.3, seed=1).cloud()
+    plain, shaken = Channel(spacing=0.2).cloud(PowerLaw()), Channel(spacing=0.2, jitter=0.3, seed=1).cloud(PowerLaw())
     np.testing.assert_array_equal(plain.nodes[plain.boundary], shaken.nodes[shaken.boundary])
     shift = np.abs(plain.nodes - shaken.nodes)[plain.interior]
     assert 0.0 < shift.max() <= 0.3 * 0.2
-    np.testing.assert_array_equal(shaken.nodes, Channel(spacing=0.2, jitter=0.3, seed=1).cloud().nodes)
-    assert not np.array_equal(shaken.nodes, Channel(spacing=0.2, jitter=0.3, seed=2).cloud().nodes)
+    np.testing.assert_array_equal(shaken.nodes, Channel(spacing=0.2, jitter=0.3, seed=1).cloud(PowerLaw()).nodes)
+    assert not np.array_equal(shaken.nodes, Channel(spacing=0.2, jitter=0.3, seed=2).cloud(PowerLaw()).nodes)
 
 
 # Motion of the boundary: ẋ = V.
@@ -101,7 +101,7 @@ def test_channel_nodes_fill_the_rectangle_and_only_inner_ones_are_jittered() -> 
 @pytest.mark.parametrize("time", [0.0, 0.0123, 0.07])
 def test_boundary_velocity_is_the_derivative_of_boundary_position(motion: str, time: float) -> None:
     scene = StirringTool(motion=motion, nodes=COARSE)
-    law, initial, h = PowerLaw(), scene.cloud(), 1e-7
+    law, initial, h = PowerLaw(), scene.cloud(PowerLaw()), 1e-7
     after, before = (scene.boundary_position(initial, time + sign * h) for sign in (1.0, -1.0))
     nodes = initial.nodes.copy()
     nodes[initial.boundary] = scene.boundary_position(initial, time)
@@ -114,7 +114,7 @@ def test_boundary_velocity_is_the_derivative_of_boundary_position(motion: str, t
 def test_a_spinning_tool_keeps_its_radius_and_an_orbiting_one_its_shape() -> None:
     time = 0.031
     spin, orbit = StirringTool(nodes=COARSE), StirringTool(motion="orbit", nodes=COARSE)
-    cloud = spin.cloud()
+    cloud = spin.cloud(PowerLaw())
     tool = cloud.nodes[cloud.boundaries["tool"]]
     turned = spin.boundary_position(cloud, time)[: len(tool)]
     np.testing.assert_allclose(np.hypot(*turned.T), 1.5, rtol=1e-14)
@@ -206,8 +206,14 @@ def test_channel_profile_carries_the_mean_speed_and_balances_its_force(index: fl
 
 def test_penalty_is_measured_in_the_viscosity_at_the_reference_rate() -> None:
     law = PowerLaw(index=0.3)
-    assert StirringTool(penalty=50.0).penalty_modulus(law) == pytest.approx(50.0 * law.viscosity(np.array([1e4]))[0])
-    assert StirringTool().penalty_modulus(law) == 0.0
+    assert StirringTool(penalty=50.0).penalty_modulus(law, np.zeros(1)) == pytest.approx(
+        50.0 * law.viscosity(np.array([1e4]))[0]
+    )
+    rates = np.array([4.0, 9.0])
+    local = StirringTool(penalty=50.0, penalty_unit="local").penalty_modulus(law, rates)
+    np.testing.assert_array_equal(local, 50.0 * law.viscosity(rates))
+    assert StirringTool(penalty=50.0, penalty_unit="absolute").penalty_modulus(law, rates) == 50.0
+    assert StirringTool().penalty_modulus(law, rates) == 0.0
 
 
 def test_increments_of_a_march() -> None:
@@ -258,7 +264,7 @@ def test_a_cloud_with_a_hole_in_its_numbers_is_a_bad_cloud() -> None:
 
 
 def test_coincident_nodes_are_named_by_their_place() -> None:
-    nodes = StirringTool(nodes=COARSE).cloud().nodes.copy()
+    nodes = StirringTool(nodes=COARSE).cloud(PowerLaw()).nodes.copy()
     nodes[100] = nodes[200]
     place = rf"coincide at \({nodes[100, 0]:.6g}, {nodes[100, 1]:.6g}\)"
     with pytest.raises(SolveError, match=place) as ending:

@@ -35,7 +35,7 @@ class Channel(Scene):
         """Mean speed over half the height."""
         return self.mean_speed / self.half_height
 
-    def cloud(self) -> Cloud:
+    def cloud(self, law: ConstitutiveLaw) -> Cloud:
         """A regular grid, jittered inside; boundary groups "bottom", "top", "inlet", "outlet"."""
         columns = max(2, round(self.length / self.spacing)) + 1
         rows = max(2, round(2.0 * self.half_height / self.spacing)) + 1

@@ -44,7 +44,7 @@ class StirringTool(Scene):
         """Tool speed over tool radius, ω."""
         return self.angular_speed
 
-    def cloud(self) -> Cloud:
+    def cloud(self, law: ConstitutiveLaw) -> Cloud:
         """Rings of nodes; boundary groups "tool" and "plate"."""
         nodes, counts = nodes_on_rings(*self.nodes.radii(self.tool_radius, self.plate_radius))
         return Cloud(

@@ -9,8 +9,8 @@ import scipy.sparse as sp
 from pydantic import Field, model_validator
 
 from nlsolve import Cloud, Discretizer, Operators
-from nlsolve_mls.least_squares import Supports, monomials, weights
-from nlsolve_mls.triangles import Triangles
+from nlsolve_collocation.least_squares import Supports, monomials, weights
+from nlsolve_collocation.triangles import Triangles
 
 GRADIENT = ((1, 0), (0, 1))
 
@@ -72,6 +72,13 @@ class MovingLeastSquares(Discretizer):
         near, dx, dy = near[interior], dx[interior], dy[interior]
         pressure_force = _node_major(_sparse_rows([[(near, dx)], [(near, dy)]], (2 * f, n)))
         return Operators(strain, force, points, dilatation, pressure_force, nodes)
+
+    def gradient(self, cloud: Cloud) -> tuple[Any, Any]:
+        """∂/∂x and ∂/∂y at the nodes."""
+        near, derivatives = self._gradient(cloud.nodes, cloud.nodes, self.volume_support)
+        shape = (len(cloud.nodes), len(cloud.nodes))
+        dx, dy = (_sparse_rows([[(near, derivative)]], shape) for derivative in derivatives)
+        return dx, dy
 
     def values(self, sources: np.ndarray, targets: np.ndarray) -> Any:
         """Sparse (T, N) matrix of moving least squares values."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from nlsolve import Component, hookimpl
-from nlsolve_mls.collocation import MovingLeastSquares
+from nlsolve_collocation.collocation import MovingLeastSquares
 
 
 @hookimpl
