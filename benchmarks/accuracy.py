@@ -2,8 +2,9 @@
 
     python benchmarks/accuracy.py
 
-Prints observed orders between clouds whose spacings are all scaled by s, and for the orbit the largest difference from
-the reference (tests/reference) off the walls, in parts of the tool speed, and the difference in drag.
+Prints observed orders between clouds whose spacings are all scaled by s, the nodes that small errors of the spin take
+at small n, and for the orbit the largest difference from the reference (tests/reference) off the walls, in parts of the
+tool speed, and the difference in drag.
 """
 
 from __future__ import annotations
@@ -22,14 +23,16 @@ DRAG = {1.0: -205426.58, 0.3: -12224.03}  # N/mm
 TOOL_SPEED = 150.0  # mm/s
 
 
-def steady(scene: dict[str, Any], index: float, **sections: Any) -> nlsolve.Results:
+def steady(
+    scene: dict[str, Any], index: float, discretizer: dict[str, Any] | None = None, **sections: Any
+) -> nlsolve.Results:
     """One steady state by Newton's method."""
     return nlsolve.run(
         {
             "question": "how accurate is this steady state?",
             "scene": {"kind": "stirring-tool", **scene},
             "law": {"kind": "power-law", "index": index, "regularization": 1e-3},
-            "discretizer": {"kind": "mls"},
+            "discretizer": discretizer or {"kind": "mls"},
             "solver": {"kind": "newton"},
             **sections,
         }
@@ -50,6 +53,30 @@ def orders() -> None:
             before = (count, error)
 
 
+RESOLUTION = {("delaunay", 0.1324): 0.6, ("delaunay", 0.05): 1.0, ("mls", 0.1324): 0.45, ("mls", 0.05): 1.0}
+"""Nodes graded to the layer of the flow that reach 0.1 % at n = 0.1324 and 0.5 % at n = 0.05."""
+
+
+def spin(kind: str, index: float) -> pd.Series:
+    """The run of a steady spin on nodes graded to its layer."""
+    nodes = {"kind": "auto", "resolution": RESOLUTION[kind, index], "growth": 0.2}
+    start = {"values": [1.0, 0.5, 0.3, 0.2, 0.13, 0.08]}
+    return steady({"nodes": nodes}, index, {"kind": kind}, start=start).runs.iloc[0]
+
+
+def spins() -> None:
+    """Print how many nodes small errors take."""
+    print("\nsteady spin:     n   nodes   smallest spacing   velocity error   inside     torque error   seconds")
+    for kind, index in RESOLUTION:
+        run = spin(kind, index)
+        errors = (f"{100 * run[name]:.3f} %" for name in ("velocity_error", "velocity_error_inside", "torque_error"))
+        print(
+            f"  {kind:10s}{index:8g}{run['nodes']:8d}{run['smallest_spacing']:15.4f} mm"
+            + "".join(f"{error:>14s}" for error in errors)
+            + f"{run['seconds_all']:10.1f}"
+        )
+
+
 @dataclass(frozen=True)
 class Comparison:
     """Differences of velocity off the walls, in parts of the tool speed, and the drag [N/mm]."""
@@ -60,8 +87,8 @@ class Comparison:
 
 
 def orbit_against_reference(index: float) -> Comparison:
-    """The steady orbit with λ/μ(100 1/s) = 1e4 on graded rings."""
-    nodes = {"kind": "graded-rings", "first": 0.03, "growth": 0.15}
+    """The steady orbit with λ/μ(100 1/s) = 1e4 on rings graded to the layer at the tool."""
+    nodes = {"kind": "auto", "resolution": 0.45, "spacing": 0.18}
     results = steady({"motion": "orbit", "penalty": 1e4, "nodes": nodes}, index, start={"values": [1.0, 0.7, 0.5, 0.4]})
     run, fields = results.runs.iloc[0], results.fields
     reference = pd.read_csv(REFERENCE / f"orbit_n{index:.1f}.csv")
@@ -86,4 +113,5 @@ def orbit() -> None:
 
 if __name__ == "__main__":
     orders()
+    spins()
     orbit()

@@ -5,7 +5,7 @@ from importlib.metadata import PackageNotFoundError, version
 from nlsolve.component import Component
 from nlsolve.discretizers import Discretizer, Operators
 from nlsolve.hookspecs import hookimpl
-from nlsolve.laws import ConstitutiveLaw, PowerForm
+from nlsolve.laws import ConstitutiveLaw, PowerForm, local_index, stress
 from nlsolve.linear import Factors, LinearSolver
 from nlsolve.problems import Expansion, NonlinearProblem
 from nlsolve.runner import Results, run
@@ -45,5 +45,7 @@ __all__ = [
     "Study",
     "__version__",
     "hookimpl",
+    "local_index",
     "run",
+    "stress",
 ]

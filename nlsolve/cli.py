@@ -1,4 +1,4 @@
-"""The command line: run, validate, plan, plugins, table. Data on standard output, everything else on error."""
+"""The command line: run, validate, plan, diagnose, plugins, table. Data on standard output, all else on error."""
 
 from __future__ import annotations
 
@@ -19,6 +19,8 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table as RichTable
 
+from nlsolve.audit import LIMITS
+from nlsolve.diagnose import diagnose as diagnostics_of
 from nlsolve.errors import StudyError, did_you_mean
 from nlsolve.plan import ASSUMPTION, forecast
 from nlsolve.progress import Watch
@@ -94,6 +96,8 @@ def run(
         with Watch(console) as watch:
             results = run_study(checked, folder, listen=watch)
     show_results(results, as_json)
+    for line in left_out(results.runs):
+        say(line)
     for note in results.notes:
         say(note)
     endings = ", ".join(f"{number} {word}" for word, number in results.runs["status"].value_counts().items())
@@ -133,6 +137,17 @@ def plan(study: StudyFile, settings: Settings = None, quick: Quick = False, as_j
     sizes = ["increments", "nodes", "unknowns", "seconds_factorization", "seconds"]
     print_frame(count(len(frame)), frame[["case", *swept, *sizes]])
     typer.echo(f"{frame['seconds'].sum():.3g} s in all ({ASSUMPTION})")
+
+
+@app.command()
+def diagnose(study: StudyFile, settings: Settings = None, quick: Quick = False, as_json: Json = False) -> None:
+    """Say how good the operators on the clouds of a study are: supports, balance, reproduction, largest weight."""
+    with ending():
+        frame = diagnostics_of(Study.from_toml(study, parse_assignments(settings or []), quick))
+    if as_json:
+        typer.echo(json.dumps(records(frame)))
+    else:
+        print_frame("Operators, one row each", frame)
 
 
 @app.command()
@@ -215,6 +230,18 @@ def show_results(results: Results, as_json: bool) -> None:
     if not tables:
         swept = list(dict.fromkeys(name for case in results.study.cases for name in case.swept))
         print_frame(results.study.question, results.runs[["case", *swept, "status", "message"]])
+
+
+def left_out(runs: pd.DataFrame) -> list[str]:
+    """The worst value of each audit over the cases, and what is to be done about it; nothing when none was made."""
+    lines = []
+    for name, limit in LIMITS.items():
+        values = pd.to_numeric(runs[name]).dropna()
+        over = int((values > limit.largest).sum())
+        word = f"  in {count(over)}: {limit.sentence}" if over else ""
+        if len(values):
+            lines.append(f"  {name.removeprefix('audit.').replace('_', ' '):<21} {values.max():<8.2g}{word}".rstrip())
+    return ["What the scenes left out, at its largest:", *lines] if lines else []
 
 
 def describe(row: PluginRow) -> str:

@@ -19,7 +19,11 @@ from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
+import numpy as np
+import scipy.sparse as sp
+
 from nlsolve.component import Component
+from nlsolve.laws import CONTRACTION
 from nlsolve.scenes import Cloud
 from nlsolve.series import Array
 
@@ -29,7 +33,7 @@ class Operators:
     """The operators of one cloud.
 
     dilatation, pressure_force, volume_points : None when no volumetric term was asked for.
-    node_areas : W (F,) [mm²] of a conservative form; None for forces per volume.
+    node_areas, strain_areas, volume_areas : W (F,), A (M,) and A_θ (L,) [mm²] of a conservative form, else None.
     """
 
     strain: Any
@@ -39,6 +43,39 @@ class Operators:
     pressure_force: Any = None
     volume_points: Array | None = None
     node_areas: Array | None = None
+    strain_areas: Array | None = None
+    volume_areas: Array | None = None
+
+    @classmethod
+    def conservative(
+        cls,
+        cloud: Cloud,
+        strain: Any,
+        strain_points: Array,
+        strain_areas: Array,
+        node_areas: Array,
+        dilatation: Any = None,
+        volume_points: Array | None = None,
+        volume_areas: Array | None = None,
+    ) -> Operators:
+        """S = −Bᵀ A and S_θ = −B_θᵀ A_θ at the interior nodes; `node_areas` (N,) of all nodes."""
+        free = np.stack([2 * cloud.interior, 2 * cloud.interior + 1], axis=1).ravel()
+        weighed = np.outer(CONTRACTION, strain_areas).ravel()
+        force = (-(strain[:, free].T @ sp.diags_array(weighed))).tocsr()
+        pressure_force = None
+        if dilatation is not None:
+            pressure_force = (-(dilatation[:, free].T @ sp.diags_array(volume_areas))).tocsr()
+        return cls(
+            strain,
+            force,
+            strain_points,
+            dilatation,
+            pressure_force,
+            volume_points,
+            node_areas[cloud.interior],
+            strain_areas,
+            volume_areas,
+        )
 
 
 class Discretizer(Component, ABC):

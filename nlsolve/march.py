@@ -12,6 +12,7 @@ import pandas as pd
 from pydantic import Field
 from scipy.spatial import cKDTree
 
+from nlsolve.audit import audit
 from nlsolve.columns import STEPS
 from nlsolve.component import Component
 from nlsolve.discretizers import Discretizer, Operators
@@ -21,6 +22,8 @@ from nlsolve.laws import ConstitutiveLaw, rate_squared
 from nlsolve.ledger import Ledger
 from nlsolve.linear import LinearSolver
 from nlsolve.measures import divergence, nodal_fields, velocity_error, wall_reaction
+from nlsolve.motion import Markers, MovingNodes
+from nlsolve.pressure import Mixing
 from nlsolve.scenes import Scene
 from nlsolve.series import Array
 from nlsolve.solvers import NonlinearSolver, RefreshRule
@@ -104,9 +107,12 @@ class _March:
         self.residual_norm = float("nan")
         self.pressure: Array | None = None  # at the volume points, iterated where the scene asks for a divergence
         self.pressure_iterations = 0
-        self.sizes: dict[str, int | None] = {"nodes": None, "unknowns": None}
+        self.sizes: dict[str, float | None] = {"nodes": None, "unknowns": None, "smallest_spacing": None}
+        self.moving: MovingNodes | None = None
+        self.markers: Markers | None = None
         self.operators: Operators
-        self.flow: Flow | None = None  # of the last solved increment
+        self.flow: Flow | None = None  # of the last solved increment, with its unknowns
+        self.unknowns: Array
 
     def run(self) -> Record:
         status, detail = Status.CONVERGED, Status.CONVERGED.sentence
@@ -127,10 +133,16 @@ class _March:
     def begin(self) -> None:
         """The cloud at t = 0, its operators, and rest inside."""
         self.initial = self.cloud = self.scene.cloud(self.setup.law)
-        self.sizes = {"nodes": len(self.cloud.nodes), "unknowns": 2 * len(self.cloud.interior)}
+        self.sizes = {
+            "nodes": len(self.cloud.nodes),
+            "unknowns": 2 * len(self.cloud.interior),
+            "smallest_spacing": float(self.cloud.nearest_distance.min()),
+        }
+        if self.scene.motion_of_nodes == "lagrangian":
+            self.moving = MovingNodes(self.scene, self.setup.discretizer, self.initial)
         self.build_operators()
         self.velocity = np.zeros_like(self.cloud.nodes)
-        self.before: Array | None = None  # velocity one increment earlier, for the second-order motion of nodes
+        self.before: Array | None = None  # velocity one increment earlier
         probe = self.scene.probe
         inside = self.cloud.interior
         self.probe = (
@@ -141,22 +153,26 @@ class _March:
         """Quasi-static state at t = 0 by continuation of the law; a steady scene's last stage is the case's own."""
         *easier, target = self.setup.law.continuation(self.setup.start.by, self.setup.start.values)
         begun = time.perf_counter()
-        outcome = None
+        outcome, law = None, target
         for law in easier:
             outcome = self.start_stage(law)
             if outcome.status is not Status.CONVERGED:
                 break
         if self.scene.increments and (outcome is None or outcome.status is Status.CONVERGED):
+            law = target
             outcome = self.iterate_pressure(lambda: self.start_stage(target))
         self.seconds_start = time.perf_counter() - begun
         self.tangent = Tangent(self.setup.linear, self.setup.refresh, self.ledger, self.start_tangent.factors)
         if outcome is not None and outcome.status is not Status.CONVERGED:
-            detail = f"on the way to the first state: {outcome.detail}"
+            by = self.setup.start.by
+            detail = f"on the way to the first state, at {by} = {getattr(law, by):g}: {outcome.detail}"
             return Outcome(outcome.status, detail, outcome.state, outcome.residual_norm, ())
         if self.scene.increments == 0:
             outcome = self.iterate_pressure(lambda: self.solve_increment(0, self.flow_of(target)))
         assert outcome is not None
         if outcome.status is Status.CONVERGED:
+            if self.scene.markers or self.scene.shifting:
+                self.markers = Markers(self.scene, self.setup.discretizer, self.initial, self.velocity)
             self.record_fields_if_due()
         return outcome
 
@@ -173,31 +189,32 @@ class _March:
             self.start_ledger,
         )
         if outcome.status is Status.CONVERGED:
-            self.flow, self.velocity = flow, flow.velocity(outcome.state)
+            self.keep(flow, outcome.state)
         return outcome
 
     def advance(self, k: int) -> Outcome:
         """One time step: move the nodes if the scene moves them, then solve the balance at its end."""
         self.time = k * self.scene.increment
-        if self.scene.motion_of_nodes == "lagrangian":
-            self.move_nodes()
-            self.build_operators()
+        if self.moving is not None:
+            self.move_nodes(self.moving)
         previous = self.velocity
         inertia = None
         if self.scene.inertia:
             inertia = Inertia(self.scene.density / self.scene.increment, previous)
         outcome = self.iterate_pressure(lambda: self.solve_increment(k, self.flow_of(self.setup.law, inertia)))
-        self.before = previous
         if outcome.status is Status.CONVERGED:
+            self.before = previous
+            if self.markers is not None:
+                self.markers.advance(self.cloud, self.velocity, self.time)
             self.record_fields_if_due()
         return outcome
 
-    def move_nodes(self) -> None:
-        """x_{k+1} = x_k + Δt (3/2 v_k − 1/2 v_{k−1}) inside (Adams-Bashforth); boundary nodes by their exact motion."""
-        step = self.velocity if self.before is None else 1.5 * self.velocity - 0.5 * self.before
-        nodes = self.cloud.nodes + self.scene.increment * step
-        nodes[self.initial.boundary] = self.scene.boundary_position(self.initial, self.time)
-        self.cloud = self.cloud.moved_to(nodes)
+    def move_nodes(self, moving: MovingNodes) -> None:
+        """The cloud and its operators at the end of the increment; velocities come along to shifted nodes."""
+        self.cloud, carry = moving.move(self.cloud, self.velocity, self.before, self.time)
+        self.build_operators()
+        if carry is not None:
+            self.velocity = self.velocity + carry @ self.velocity
 
     def build_operators(self) -> None:
         before = self.operators.volume_points if self.pressure is not None else None
@@ -227,11 +244,8 @@ class _March:
         return rate_squared((self.operators.strain @ self.velocity.ravel()).reshape(3, -1)[:, nearest])
 
     def iterate_pressure(self, solve_once: Callable[[], Outcome]) -> Outcome:
-        """p ← p − λ div v after each solve until ‖div v‖ ≤ divergence · ‖ε̄‖ (augmented Lagrangian); once without one.
-
-        Powell (1969), Hestenes (1969); for viscous flow Fortin & Glowinski (1983).
-        """
-        asked, most = self.scene.divergence, self.setup.budget.pressures
+        """Solve, and iterate the pressure until ‖div v‖ ≤ divergence · ‖ε̄‖ where the scene asks for that."""
+        asked, most, mixing = self.scene.divergence, self.setup.budget.pressures, Mixing()
         outcome = solve_once()
         if asked is None:
             return outcome
@@ -241,7 +255,9 @@ class _March:
             assert self.flow is not None
             if divergence(self.flow, self.velocity) <= asked:
                 return outcome
-            self.pressure = self.flow.pressure(outcome.state)
+            image = self.flow.pressure(outcome.state)
+            assert image is not None
+            self.pressure = mixing.next(np.zeros_like(image) if self.pressure is None else self.pressure, image)
             self.pressure_iterations += 1
             outcome = solve_once()
         reached = divergence(self.flow, self.velocity) if self.flow is not None else np.nan
@@ -266,8 +282,8 @@ class _March:
             self.validity_time = (k - 1) * self.scene.increment
         self.residual_norm = float(np.fmax(self.residual_norm, outcome.residual_norm))
         if solved:
-            self.flow, self.velocity = flow, flow.velocity(outcome.state)
-            self.increments += 1
+            self.keep(flow, outcome.state)
+            self.increments = max(k, 1)
             self.rows[-1]["accepted"] = True
             if self.probe is not None:
                 places = zip(
@@ -284,6 +300,11 @@ class _March:
         )
         return outcome
 
+    def keep(self, flow: Flow, unknowns: Array) -> None:
+        """A solved state: what is measured, and where the next solve begins."""
+        self.flow, self.unknowns = flow, unknowns
+        self.velocity = flow.velocity(unknowns)
+
     # What is left behind.
 
     def record_fields_if_due(self) -> None:
@@ -291,9 +312,9 @@ class _March:
         asked = (*self.setup.record, self.scene.horizon or 0.0)
         if any(abs(self.time - moment) < 0.5 * self.scene.increment for moment in asked):
             assert self.flow is not None
-            self.snapshots.append(
-                nodal_fields(self.scene, self.setup.discretizer, self.flow, self.velocity, self.initial, self.time)
-            )
+            fields = nodal_fields(self.scene, self.setup.discretizer, self.flow, self.velocity, self.initial, self.time)
+            places = np.full_like(self.initial.nodes, np.nan) if self.markers is None else self.markers.places
+            self.snapshots.append(fields.assign(marker_x=places[:, 0], marker_y=places[:, 1]))
 
     def record(self, status: Status, detail: str) -> Record:
         """The row of the case, whatever its ending; what is measured on fields is of the last solved increment."""
@@ -308,6 +329,7 @@ class _March:
             "status": status.word,
             "message": message,
             **self.sizes,
+            "cloud_quality": None if self.moving is None else self.moving.quality,
             "increments": self.increments,
             "time": reached,
             "iterations": self.iterations,
@@ -330,6 +352,7 @@ class _March:
             "seconds_series": ledger.seconds["series_order"],
             "seconds_operators": ledger.seconds["operators"],
             "seconds_start": self.seconds_start,
+            "seconds_all": ledger.seconds["method"] + ledger.seconds["operators"] + self.seconds_start,
             "ordering": factors.ordering if factors else None,
             "fill": factors.fill if factors else None,
             "factor_solve_ratio": ledger.each("factorization") / ledger.each("triangular_solve"),
@@ -337,9 +360,12 @@ class _March:
             "residual_norm": self.residual_norm,
         }
         if self.flow is not None:
-            summary["divergence"] = divergence(self.flow, self.velocity)
-            summary |= velocity_error(self.scene, self.flow, self.velocity, reached)
-            summary |= wall_reaction(self.scene, self.setup.discretizer, self.flow, self.velocity, reached)
+            flow, velocity, discretizer = self.flow, self.flow.velocity(self.unknowns), self.setup.discretizer
+            change = None if self.before is None else (velocity - self.before) / self.scene.increment
+            summary["divergence"] = divergence(flow, velocity)
+            summary |= velocity_error(self.scene, flow, velocity, reached)
+            summary |= wall_reaction(self.scene, discretizer, flow, velocity, reached)
+            summary |= audit(self.scene, discretizer, flow, velocity, change, reached)
         steps = pd.DataFrame(self.rows, columns=[name for name in STEPS if name != "case"])
         fields = pd.concat(self.snapshots, ignore_index=True) if self.snapshots else pd.DataFrame()
         return Record(summary, steps, fields)

@@ -13,7 +13,7 @@ import pandas as pd
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
-from nlsolve.columns import RUNS
+from nlsolve.outcomes import telling
 from nlsolve.status import Status
 
 PRINTED_DOTS_PER_INCH = 200  # of the PNGs, see nlsolve.figures
@@ -34,7 +34,7 @@ def write_report(
     figures : (name, caption); figures/NAME.png in the folder is linked, and a missing one is said to be missing.
     """
     failed = runs[runs["status"] != Status.CONVERGED.word]
-    parameters = [str(name) for name in runs if name not in RUNS and len({str(value) for value in runs[name]}) > 1]
+    parameters = telling(runs)
     environment = Environment(
         loader=PackageLoader("nlsolve", ""), autoescape=True, undefined=StrictUndefined, keep_trailing_newline=True
     )

@@ -111,6 +111,10 @@ class Scene(Component, ABC):
     motion_of_nodes: Literal["fixed", "lagrangian"] = Field(
         "fixed", description="nodes stay, or move with the material"
     )
+    markers: bool = Field(False, description="carry material markers, from each node at t = 0; shifted nodes always do")
+    shifting: float = Field(
+        0.0, ge=0, le=1, description="moving nodes: part of the overlap by which near ones part in an increment"
+    )
     probe: tuple[float, float] | None = Field(None, description="place whose nearest node is recorded in time [mm]")
 
     @model_validator(mode="after")
@@ -122,6 +126,14 @@ class Scene(Component, ABC):
         if self.convection and self.motion_of_nodes == "lagrangian":
             raise ValueError(
                 'convection = true: nodes that move with the material carry it already; use motion_of_nodes = "fixed"'
+            )
+        if self.markers and self.motion_of_nodes == "lagrangian" and not self.shifting:
+            raise ValueError(
+                'markers = true: nodes that move are the markers themselves; use motion_of_nodes = "fixed" or shifting'
+            )
+        if self.shifting and self.motion_of_nodes == "fixed":
+            raise ValueError(
+                f'shifting = {self.shifting:g}: fixed nodes are not shifted; use motion_of_nodes = "lagrangian"'
             )
         return self
 

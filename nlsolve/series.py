@@ -157,7 +157,7 @@ class Series:
     def _refuse(self, *_: Any) -> NoReturn:
         raise TypeError(
             "absolute value, comparison and choice by condition are not analytic, so they have no Taylor coefficients: "
-            "write the formula with +, -, *, /, powers, exp, log, sqrt, sinh, asinh and tanh"
+            "write the formula with +, -, *, /, powers, exp, log, sqrt, sin, cos, sinh, cosh, tanh and asinh"
         )
 
     __abs__ = __lt__ = __le__ = __gt__ = __ge__ = __bool__ = __float__ = _refuse
@@ -260,17 +260,17 @@ def _from_inverse_slope(function: np.ufunc, x: Series, g: Series) -> Series:
     return y
 
 
-def _hyperbolic(x: Series) -> tuple[Series, Series]:
-    """sinh x and cosh x, each the other's slope."""
+def _sine_and_cosine(x: Series, sine: np.ufunc, cosine: np.ufunc, sign: float) -> tuple[Series, Series]:
+    """s′ = c x′,  c′ = ± s x′ : sin x and cos x with sign −1, sinh x and cosh x with sign +1."""
 
-    def sine(j: int) -> Array:
-        return np.sinh(x.coefficient(0)) if j == 0 else _derivative_convolve(x, cosh, j)
+    def of_sine(j: int) -> Array:
+        return sine(x.coefficient(0)) if j == 0 else _derivative_convolve(x, c, j)
 
-    def cosine(j: int) -> Array:
-        return np.cosh(x.coefficient(0)) if j == 0 else _derivative_convolve(x, sinh, j)
+    def of_cosine(j: int) -> Array:
+        return cosine(x.coefficient(0)) if j == 0 else sign * _derivative_convolve(x, s, j)
 
-    sinh, cosh = Series._by_rule(sine), Series._by_rule(cosine)
-    return sinh, cosh
+    s, c = Series._by_rule(of_sine), Series._by_rule(of_cosine)
+    return s, c
 
 
 _FORMULAS: dict[np.ufunc, Callable[..., Series]] = {
@@ -285,8 +285,10 @@ _FORMULAS: dict[np.ufunc, Callable[..., Series]] = {
     np.sqrt: lambda x: _power(x, 0.5),
     np.exp: lambda x: _from_slope(np.exp, x, lambda y: y),
     np.log: lambda x: _from_inverse_slope(np.log, x, x),
-    np.sinh: lambda x: _hyperbolic(x)[0],
-    np.cosh: lambda x: _hyperbolic(x)[1],
+    np.sin: lambda x: _sine_and_cosine(x, np.sin, np.cos, -1.0)[0],
+    np.cos: lambda x: _sine_and_cosine(x, np.sin, np.cos, -1.0)[1],
+    np.sinh: lambda x: _sine_and_cosine(x, np.sinh, np.cosh, 1.0)[0],
+    np.cosh: lambda x: _sine_and_cosine(x, np.sinh, np.cosh, 1.0)[1],
     np.tanh: lambda x: _from_slope(np.tanh, x, lambda y: 1.0 - y * y),
     np.arcsinh: lambda x: _from_inverse_slope(np.arcsinh, x, np.sqrt(1.0 + x * x)),
 }

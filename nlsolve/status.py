@@ -16,6 +16,8 @@ class Status(Enum):
     SINGULAR_TANGENT = "a tangent could not be factorised: it is singular to working precision"
     RANGE_EXHAUSTED = "the range of the series fell to nothing before the end of the path"
     BAD_CLOUD = "the nodes no longer carry a discretisation: coincident nodes or supports without enough neighbours"
+    ILL_CONDITIONED = "the local systems of the discretisation are singular to working precision"
+    NOT_APPLICABLE = "the method does not apply to this problem"
     CRASHED = "the case stopped on an error in the program or in a plugin"
 
     @property

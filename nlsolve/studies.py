@@ -16,12 +16,13 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, create_model
 
 from nlsolve.columns import RUNS
 from nlsolve.driver import Budget, StoppingTest
-from nlsolve.errors import Problem, Source, StudyError, did_you_mean, problems_in
+from nlsolve.errors import ABSENT, Problem, Source, StudyError, did_you_mean, problems_in
 from nlsolve.figures import FigureSpec
-from nlsolve.locate import lines_of
+from nlsolve.locate import Place, lines_of
 from nlsolve.march import Setup, Start
+from nlsolve.outcomes import VARIANT
 from nlsolve.registry import CONTRACTS, Registry, load_registry
-from nlsolve.sweeps import Document, Sweep, assign_all, leaves, merged, places_of, swept_places
+from nlsolve.sweeps import Document, Point, Sweep, assign_all, leaves, merged, places_of, swept_places
 from nlsolve.tables import TableSpec, check
 
 SECTIONS = tuple(field.name for field in fields(Setup))
@@ -50,8 +51,10 @@ class Case:
     """One setup to be run.
 
     id : digest of the validated components.
-    parameters : every parameter under its dotted name ("solver.order"); lists as JSON text.
-    swept : the names among them that the study sweeps and that differ between its cases.
+    parameters : every parameter under its dotted name ("solver.order"); lists as JSON text. Before them, where a sweep
+        has named settings, `variant`: the names of this case's.
+    swept : the names among them that the study sweeps and that differ between its cases; `variant` stands for all that
+        its settings assign.
     """
 
     id: str
@@ -62,7 +65,8 @@ class Case:
     @property
     def label(self) -> str:
         """The swept parameters, for people."""
-        return ", ".join(f"{name} = {self.parameters[name]}" for name in self.swept) or "the only case"
+        words = [f"{'' if name == VARIANT else f'{name} = '}{self.parameters[name]}" for name in self.swept]
+        return ", ".join(words) or "the only case"
 
 
 @dataclass(frozen=True)
@@ -155,16 +159,19 @@ class _Builder:
         problems += [
             Problem(("figure", number, field), column, f"no such column of the results; {did_you_mean(column, known)}")
             for number, figure in enumerate(frame.figure)
-            for field in ("where", "group")
-            for column in getattr(figure, field)
+            for field, columns in figure.columns_of_runs().items()
+            for column in columns
             if column not in known
         ]
         self.refuse(problems)
         return Study(name, frame.question, cases, tuple(tables), frame.figure, bool(frame.quick))
 
     def refuse(self, problems: list[Problem]) -> None:
-        if problems:
-            raise StudyError(*dict.fromkeys(problem.sentence(self.source) for problem in problems))
+        self.refuse_sentences([problem.sentence(self.source) for problem in problems])
+
+    def refuse_sentences(self, sentences: list[str]) -> None:
+        if sentences:
+            raise StudyError(*dict.fromkeys(sentences))
 
     def frame(self) -> Frame:
         document = {name: value for name, value in self.document.items() if name not in SECTIONS}
@@ -191,24 +198,33 @@ class _Builder:
 
     def cases(self, frame: Frame) -> tuple[Case, ...]:
         cases: dict[str, Case] = {}
-        problems: list[Problem] = []
+        sentences: list[str] = []
+        named = {name for sweep in frame.sweep if sweep.each is not None for name in sweep.columns}
         base = {name: value for name, value in self.document.items() if name in SECTIONS}
-        for points in itertools.product(*(sweep.assignments() for sweep in frame.sweep)):
-            assigned = {name: value for point in points for name, value in point.items()}
+        by_hand = {name: value for name, value in self.overrides.items() if name.split(".")[0] in SECTIONS}
+        root: Place = ("quick", "sweep") if self.quick and "sweep" in self.document["quick"] else ("sweep",)
+        for points in itertools.product(*(sweep.points((*root, number)) for number, sweep in enumerate(frame.sweep))):
+            source = self.source_of(points, named, by_hand)
+            assigned = {name: value for point in points for name, value in point.values.items()}
             document = merged({}, base)
             sections_first = dict(sorted(assigned.items(), key=lambda item: item[0].count(".")))
-            by_hand = {name: value for name, value in self.overrides.items() if name.split(".")[0] in SECTIONS}
             wrong = assign_all(document, sections_first) + assign_all(document, by_hand)  # the hand wins
             if wrong:
-                problems += wrong
+                sentences += [problem.sentence(source) for problem in wrong]
                 continue
             try:
-                case = self.case(document, tuple(assigned))
+                case = self.case(document, points)
             except _Refused as refused:
-                problems += refused.problems
-            else:
-                cases.setdefault(case.id, case)  # what is set by hand may make two cases one
-        self.refuse(problems)
+                sentences += [problem.sentence(source) for problem in refused.problems]
+                continue
+            twin = cases.setdefault(case.id, case)  # what is set by hand may make two cases one
+            if twin.parameters.get(VARIANT) != case.parameters.get(VARIANT):
+                names = [each.parameters[VARIANT] for each in (twin, case)]
+                hand = " with what is set by hand" if by_hand else ""
+                same = f"{names[0]!r} and {names[1]!r} are one and the same case{hand}: change one of them, or drop it"
+                place = next(point.place for point in points if point.name)
+                sentences.append(Problem(place, ABSENT, same).sentence(source))
+        self.refuse_sentences(sentences)
         everyone = [case.parameters for case in cases.values()]
         differing = {
             name
@@ -220,7 +236,14 @@ class _Builder:
             replace(case, swept=tuple(name for name in case.swept if name in differing)) for case in cases.values()
         )
 
-    def case(self, document: Document, swept: tuple[str, ...]) -> Case:
+    def source_of(self, points: tuple[Point, ...], named: set[str], by_hand: Mapping[str, Any]) -> Source:
+        """Where the values of one combination were written; the hand wins here too."""
+        hand = dict(leaves(by_hand))
+        known = {name: where for name, where in self.source.aliases.items() if name in hand or name not in named}
+        mine = {name: place for point in points for name, place in point.places.items() if name not in hand}
+        return replace(self.source, aliases=known | {name: self.source.at(place) for name, place in mine.items()})
+
+    def case(self, document: Document, points: tuple[Point, ...]) -> Case:
         """Validate one combination. Raises _Refused."""
         for section, default in DEFAULT_KINDS.items():
             self.complete(document, section, default)
@@ -253,11 +276,15 @@ class _Builder:
         parameters = {
             name: json.dumps(value) if isinstance(value, list | dict) else value for name, value in leaves(plain)
         }
+        swept = [name for point in points if not point.name for name in point.values]
         names = tuple(
             parameter
             for parameter in parameters
             if any(parameter == name or parameter.startswith(f"{name}.") for name in swept)
         )
+        variant = ", ".join(point.name for point in points if point.name)
+        if variant:
+            parameters, names = {VARIANT: variant, **parameters}, (VARIANT, *names)
         return Case(digest, setup, parameters, names)
 
     def complete(self, document: Document, section: str, default: Mapping[str, Any]) -> None:

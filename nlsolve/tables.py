@@ -1,4 +1,7 @@
-"""Tables a study declares: one cell a run, rows and columns by parameter, the paper's values beside them."""
+"""Tables a study declares: one cell a run, rows and columns by parameter, the paper's values beside them.
+
+Or, of many runs: the cheapest within an error (`cheapest`), and how many there are (`count`).
+"""
 
 from __future__ import annotations
 
@@ -14,12 +17,14 @@ from rich.table import Table as RichTable
 
 from nlsolve.columns import RUNS
 from nlsolve.component import Component
-from nlsolve.errors import Problem, StudyError, did_you_mean
+from nlsolve.condense import COUNT, NO_RUN, WITHIN, Cheapest, counted, key_of
+from nlsolve.errors import ABSENT, Problem, StudyError, did_you_mean
+from nlsolve.outcomes import ACCEPTED, OUTCOME, outcome
 from nlsolve.papers import PaperValues
 from nlsolve.status import Status
 
-NO_RUN = "–"
-"""Stands in a cell that no run belongs to."""
+MEASURED = (*RUNS, OUTCOME)
+"""Columns that are known only when a case has been run."""
 
 Scalar = bool | int | float | str
 Names = Annotated[tuple[str, ...], BeforeValidator(lambda value: (value,) if isinstance(value, str) else value)]
@@ -31,12 +36,22 @@ class TableSpec(Component):
     noun: ClassVar[str] = "table"
 
     name: str = Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_-]*$", description="stem of the files written")
-    rows: Names = Field(min_length=1, description="column or columns of `runs` that tell the rows apart")
+    rows: Names = Field(
+        (), description="column or columns of `runs` that tell the rows apart; may be absent with cheapest"
+    )
     columns: Names = Field((), description="column or columns of `runs` that tell the columns apart")
-    value: Names = Field(min_length=1, description="column or columns of `runs` shown in the cells")
+    value: Names = Field(
+        (), description="column or columns of `runs` shown in the cells, or `outcome`; absent with count"
+    )
     where: dict[str, Scalar] = Field(default_factory=dict, description="column of `runs` -> value a run must have")
     caption: str = Field("", description="sentence above the table")
     format: str | None = Field(None, description='Python format of a number, such as ".2e"; absent: four digits')
+    accepted: float = Field(ACCEPTED, gt=0, description="relative error up to which `outcome` is right")
+    error: str = Field("velocity_error", description="column of `runs` by which `outcome` is right or wrong")
+    cheapest: Cheapest | None = Field(
+        None, description="keep the cheapest run within each error only, of each of the rows and columns"
+    )
+    count: bool = Field(False, description="cells count runs, such as rows = variant, columns = outcome")
     paper: PaperValues | None = Field(None, description="a paper's values to compare with")
 
     @field_validator("format")
@@ -50,15 +65,46 @@ class TableSpec(Component):
         return value
 
     @model_validator(mode="after")
+    def _says_what_it_shows(self) -> TableSpec:
+        if self.count and (self.value or self.cheapest is not None):
+            raise ValueError(f"count = true shows numbers of runs; drop {'value' if self.value else 'cheapest'}")
+        if not (self.count or self.value):
+            raise ValueError("value is required, and missing: columns to show, or count = true")
+        if not self.rows and self.cheapest is None:
+            raise ValueError("rows is required, and missing: a column that tells the rows apart")
+        if self.paper is not None and (self.count or self.cheapest is not None):
+            raise ValueError("paper values are compared run by run, so neither with cheapest nor with count")
+        return self
+
+    @model_validator(mode="after")
     def _one_value_beside_a_paper(self) -> TableSpec:
         if self.paper is not None and self.columns and len(self.value) > 1:
             raise ValueError("a table with paper values and columns should show one value only")
         return self
 
+    @property
+    def shown(self) -> Names:
+        """Columns whose values are in the cells."""
+        return (COUNT,) if self.count else self.value
+
+    @property
+    def labels(self) -> Names:
+        """Columns whose values tell the rows apart."""
+        return self.rows if self.cheapest is None else (WITHIN, *self.rows)
+
+    def condensed(self, runs: Sequence[Mapping[str, Any]]) -> Sequence[Mapping[str, Any]]:
+        """A record a cell of the runs that fit: themselves, unless they are to be counted or to compete."""
+        layout = (*self.rows, *self.columns)
+        if self.cheapest is not None:
+            return self.cheapest.of(runs, layout)
+        return counted(runs, layout) if self.count else runs
+
     def text(self, value: Any) -> str:
         """A cell for people."""
         if isinstance(value, str):
             return value
+        if isinstance(value, (bool, np.bool_)):
+            return "yes" if value else "no"
         if value is None or np.isnan(value):
             return NO_RUN
         if self.format is not None:
@@ -129,20 +175,21 @@ class Table:
 
 def build(spec: TableSpec, runs: pd.DataFrame) -> Table:
     """The declared table of these runs. Raises StudyError when two runs claim one cell or a name is unknown."""
-    records: list[dict[str, Any]] = [dict(zip(runs.columns, row, strict=True)) for row in runs.itertuples(index=False)]
+    records = [dict(zip(runs.columns, row, strict=True)) for row in runs.itertuples(index=False)]
+    records = [{**run, OUTCOME: outcome(run, spec.accepted, spec.error)} for run in records]
     problems = check(spec, records)
     if problems:
         raise StudyError(*(f"table {spec.name!r}: {problem.expected}" for problem in problems))
-    chosen = [run for run in records if _fits(spec, run)]
-    rows = list(dict.fromkeys(_key(spec.rows, run) for run in chosen))
+    chosen = spec.condensed([run for run in records if _fits(spec, run)])
+    rows = list(dict.fromkeys(key_of(spec.labels, run) for run in chosen))
     columns = list(dict.fromkeys(key for run in chosen for key in _column_keys(spec, run)))
-    cells = np.full((len(rows), len(columns)), np.nan, dtype=object)
+    cells = np.full((len(rows), len(columns)), 0 if spec.count else np.nan, dtype=object)
     for run in chosen:
-        for value, key in zip(spec.value, _column_keys(spec, run), strict=True):
-            failed = run["status"] != Status.CONVERGED.word
-            cells[rows.index(_key(spec.rows, run)), columns.index(key)] = run["status"] if failed else run.get(value)
-    names = (*spec.columns, "") if spec.columns and len(spec.value) > 1 else spec.columns or ("",)
-    index, header = _index(rows, spec.rows), _index(columns, names)
+        for value, key in zip(spec.shown, _column_keys(spec, run), strict=True):
+            failed = not spec.count and run["status"] != Status.CONVERGED.word
+            cells[rows.index(key_of(spec.labels, run)), columns.index(key)] = run.get("status" if failed else value)
+    names = (*spec.columns, "") if spec.columns and len(spec.shown) > 1 else spec.columns or ("",)
+    index, header = _index(rows, spec.labels), _index(columns, names)
     frame = pd.DataFrame(cells, index=index, columns=header, dtype=object)
     if spec.paper is None:
         return Table(spec, frame)
@@ -150,19 +197,22 @@ def build(spec: TableSpec, runs: pd.DataFrame) -> Table:
     return Table(spec, frame, pd.DataFrame(compared, index=index, columns=header, dtype=object))
 
 
-def check(spec: TableSpec, runs: Sequence[Mapping[str, Any]], measured: Iterable[str] = RUNS) -> list[Problem]:
+def check(spec: TableSpec, runs: Sequence[Mapping[str, Any]], measured: Iterable[str] = MEASURED) -> list[Problem]:
     """What keeps a table from being laid out: unknown names, cells with several runs, a paper of another shape.
 
     Works on the parameters of cases before anything has been computed, and on rows of `runs` afterwards.
     """
     known = list(dict.fromkeys([*measured, *(name for run in runs for name in run)]))
+    contest = () if spec.cheapest is None else (spec.cheapest.cost, spec.cheapest.error)
     problems = [
-        Problem((field,), name, f"no such column of the results; {did_you_mean(name, known)}")
-        for field, names in [
-            ("rows", spec.rows),
-            ("columns", spec.columns),
-            ("value", spec.value),
-            ("where", spec.where),
+        Problem(place, name, f"no such column of the results; {did_you_mean(name, known)}")
+        for place, names in [
+            (("rows",), spec.rows),
+            (("columns",), spec.columns),
+            (("value",), spec.value),
+            (("where",), spec.where),
+            (("cheapest", "cost"), contest[:1]),
+            (("cheapest", "error"), contest[1:]),
         ]
         for name in names
         if name not in known
@@ -173,17 +223,20 @@ def check(spec: TableSpec, runs: Sequence[Mapping[str, Any]], measured: Iterable
         return problems
     chosen = [run for run in runs if _fits(spec, run)]
     if not chosen:
-        return [Problem(("where",), dict(spec.where), "no case has these values")]
+        asked = ", ".join(f"{name} = {value!r}" for name, value in spec.where.items())
+        return [Problem(("where",), ABSENT, f"no case has these values: {asked}")]
+    if spec.count or spec.cheapest is not None:
+        return []
     cells: dict[tuple[Any, ...], Mapping[str, Any]] = {}
     for run in chosen:
-        other = cells.setdefault(_key(layout, run), run)
+        other = cells.setdefault(key_of(layout, run), run)
         if other is not run:
             differing = [name for name in run if name not in measured and not _same(run[name], other.get(name))]
             hint = f"; they differ in {differing[0]!r}: put it in rows, columns or where" if differing else ""
-            here = ", ".join(f"{name} = {value!r}" for name, value in zip(layout, _key(layout, run), strict=True))
+            here = ", ".join(f"{name} = {value!r}" for name, value in zip(layout, key_of(layout, run), strict=True))
             return [Problem(("rows",), list(spec.rows), f"several runs land in the cell {here}{hint}")]
     if spec.paper is not None:
-        height = len({_key(spec.rows, run) for run in chosen})
+        height = len({key_of(spec.rows, run) for run in chosen})
         width = len({key for run in chosen for key in _column_keys(spec, run)})
         lengths = [len(row) for row in spec.paper.values]
         if lengths != [width] * height:
@@ -200,15 +253,11 @@ def _same(a: Any, b: Any) -> bool:
     return bool(a == b) or (pd.isna(a) and pd.isna(b))
 
 
-def _key(names: tuple[str, ...], run: Mapping[str, Any]) -> tuple[Any, ...]:
-    return tuple(NO_RUN if pd.isna(run.get(name)) else run.get(name) for name in names)
-
-
 def _column_keys(spec: TableSpec, run: Mapping[str, Any]) -> list[tuple[Any, ...]]:
     """The table's columns that a run has a value for."""
-    if spec.columns and len(spec.value) == 1:
-        return [_key(spec.columns, run)]
-    return [(*_key(spec.columns, run), value) for value in spec.value]
+    if spec.columns and len(spec.shown) == 1:
+        return [key_of(spec.columns, run)]
+    return [(*key_of(spec.columns, run), value) for value in spec.shown]
 
 
 def _index(keys: list[tuple[Any, ...]], names: tuple[str, ...]) -> pd.Index:

@@ -15,9 +15,10 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 
-from nlsolve.discretizers import Discretizer
+from nlsolve.discretizers import Discretizer, Operators
 from nlsolve.driver import Budget, StoppingTest, solve
-from nlsolve.laws import ConstitutiveLaw
+from nlsolve.flow import node_major
+from nlsolve.laws import CONTRACTION, ConstitutiveLaw
 from nlsolve.ledger import Ledger
 from nlsolve.linear import LinearSolver
 from nlsolve.problems import NonlinearProblem
@@ -84,8 +85,8 @@ def check_law(law: ConstitutiveLaw, rates: Iterable[float] = tuple(10.0 ** np.ar
 
 def check_discretizer(discretizer: Discretizer, cloud: Cloud, tolerance: float = 1e-10) -> None:
     """Shapes, and what a consistent scheme reproduces, to `tolerance` of the sizes summed: no strain of rigid motions,
-    constant strain rate of linear velocities, no force of constant stress or pressure, the divergence of linear stress,
-    linear values.
+    constant strain rate of linear velocities, no force of constant stress or pressure, values and gradients of linear
+    fields. Besides, of a strong form the divergence of linear stress; of a conservative one that it is adjoint.
     """
     n, free, extent = len(cloud.nodes), cloud.interior, float(np.ptp(cloud.nodes, axis=0).max())
     plain, full = discretizer.operators(cloud, False), discretizer.operators(cloud, True)
@@ -95,9 +96,13 @@ def check_discretizer(discretizer: Discretizer, cloud: Cloud, tolerance: float =
     m, count, f = len(full.strain_points), len(full.volume_points), len(free)
     shapes = {"strain": (3 * m, 2 * n), "force": (2 * f, 3 * m), "strain_points": (m, 2)}
     volumetric = {"dilatation": (count, 2 * n), "pressure_force": (2 * f, count), "volume_points": (count, 2)}
+    conservative = full.node_areas is not None
+    if conservative:
+        shapes |= {"node_areas": (f,), "strain_areas": (m,)}
+        volumetric |= {"volume_areas": (count,)}
     for operators, expected in ((plain, shapes), (full, shapes | volumetric)):
         for name, shape in expected.items():
-            found = getattr(operators, name).shape
+            found = getattr(getattr(operators, name), "shape", None)
             _require(found == shape, f"{name} of shape {found}, not {shape}")
 
     def holds(what: str, matrix: Any, field: Array, expected: Any) -> None:
@@ -116,12 +121,34 @@ def check_discretizer(discretizer: Discretizer, cloud: Cloud, tolerance: float =
         holds(f"dilatation of a {name}", full.dilatation, velocity, np.trace(gradient))
     holds("force of a constant stress", full.force, np.repeat([1.0, -2.0, 0.5], m), 0.0)
     holds("force of a constant pressure", full.pressure_force, np.ones(count), 0.0)
-    slopes = np.array([[0.3, -1.0], [0.8, 0.2], [-0.6, 0.9]])  # of xx, yy, xy along x and y
-    divergence = np.tile([slopes[0, 0] + slopes[2, 1], slopes[2, 0] + slopes[1, 1]], f)
-    holds("force of a linear stress", full.force, slopes @ points.T, divergence)
+    if conservative:
+        _check_adjoint(full, node_major(free))
+    else:
+        slopes = np.array([[0.3, -1.0], [0.8, 0.2], [-0.6, 0.9]])  # of xx, yy, xy along x and y
+        divergence = np.tile([slopes[0, 0] + slopes[2, 1], slopes[2, 0] + slopes[1, 1]], f)
+        holds("force of a linear stress", full.force, slopes @ points.T, divergence)
+    for axis, derivative in zip("xy", discretizer.gradient(cloud), strict=True):
+        _require(derivative.shape == (n, n), f"∂/∂{axis} of shape {derivative.shape}, not {(n, n)}")
+        holds(f"∂/∂{axis} of a linear field", derivative, x @ [2.0, -3.0], {"x": 2.0, "y": -3.0}[axis])
     values = discretizer.values(full.strain_points, cloud.nodes[free])
     _require(values.shape == (f, m), f"values of shape {values.shape}, not {(f, m)}")
     holds("values of a linear field", values, extent + points @ [2.0, -3.0], extent + x[free] @ [2.0, -3.0])
+
+
+def _check_adjoint(operators: Operators, free: Array) -> None:
+    """S + Bᵀ A = 0 and S_θ + B_θᵀ A_θ = 0 on the unknowns; no area is negative, and nodes have some."""
+    assert (
+        operators.strain_areas is not None and operators.volume_areas is not None and operators.node_areas is not None
+    )
+    weighed = np.outer(CONTRACTION, operators.strain_areas).ravel()
+    for name, force, rate, areas in (
+        ("S = −Bᵀ A", operators.force, operators.strain, weighed),
+        ("S_θ = −B_θᵀ A_θ", operators.pressure_force, operators.dilatation, operators.volume_areas),
+    ):
+        expected = -(rate[:, free].T @ sp.diags_array(areas))
+        _same(abs(force - expected).max(), 0.0, float(abs(expected).max()), name, 1e-13)
+        _require(np.min(areas) >= 0.0, f"{name}: an area is negative")
+    _require(np.min(operators.node_areas, initial=1.0) > 0.0, "the material around an interior node has no area")
 
 
 def check_scene(scene: Scene, law: ConstitutiveLaw) -> None:

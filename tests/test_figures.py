@@ -52,6 +52,8 @@ def snapshot(case: str, time: float) -> pd.DataFrame:
         "y": y,
         "exact_u": -speed * y / r,
         "exact_v": speed * x / r,
+        "marker_x": np.full(len(r), np.nan),
+        "marker_y": np.full(len(r), np.nan),
     }
     values |= {"u": 1.02 * values["exact_u"], "v": 1.02 * values["exact_v"], "rate": 11 * speed / r / np.sqrt(3)}
     return pd.DataFrame(values | {"case": case, "time": time, "node": np.arange(len(r)), "boundary": groups})
@@ -323,6 +325,8 @@ def test_a_field_at_rest_is_drawn(frames: dict[str, pd.DataFrame]) -> None:
             "group": ["solver.kind", "solver.order", "solver.tolerance"],
         },
         {"kind": "line", "source": "runs", "x": "solver.order", "y": "branches", "group": "solver.tolerance"},
+        {"kind": "map", "x": "solver.order", "y": ["solver.kind", "solver.tolerance"], "value": "branches"},
+        {"kind": "trade", "x": "branches", "y": "solver.tolerance", "group": "solver.order"},
         {"kind": "cloud", "time": 0, "where": ONE, "probe": (0, 1.6)},
         {"kind": "profile", "axis": "y", "value": "u", "where": ANM},
         {"kind": "field", "value": "rate", "log": True, "where": ANM},

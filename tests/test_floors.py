@@ -18,15 +18,15 @@ PLUGINS = HOUSE.parent / "plugins"
 FLOORS = [
     "series component status columns",
     "laws scenes discretizers linear problems solvers",
-    "flow tangent march measures ledger driver",
+    "flow tangent pressure motion march measures audit ledger driver",
     "hookspecs registry",
-    "studies locate errors sweeps runner store tables papers report plan figures",
+    "studies locate errors outcomes condense sweeps runner store tables papers report plan diagnose figures",
     "testing small cli progress __init__",
 ]
 FLOOR = {name: number for number, names in enumerate(FLOORS) for name in names.split()}
 MODULES = sorted(HOUSE.rglob("*.py"))
 PLUGIN_MODULES = sorted(PLUGINS.rglob("*.py"))
-LIBRARIES = {"nlsolve", "numpy", "scipy", "pydantic"}
+LIBRARIES = {"nlsolve", "numpy", "scipy", "pydantic", "meshio"}
 
 
 def imports(path: Path) -> Iterator[tuple[str, list[str]]]:

@@ -66,6 +66,11 @@ def test_endings_are_counted_and_failures_explained(page: str) -> None:
     assert headings == ["case", "solver.order", "solver.kind", "ending", "what happened"]
 
 
+def test_a_variant_stands_for_what_its_settings_assign(tmp_path: Path) -> None:
+    page = write_report(tmp_path, "?", {}, [], RUNS.assign(variant=["a", "b", "c"])).read_text(encoding="utf-8")
+    assert re.findall(r'<th class="words">(.*?)</th>', page) == ["case", "variant", "ending", "what happened"]
+
+
 def test_no_failures_no_section(tmp_path: Path) -> None:
     page = write_report(tmp_path, "?", {}, [], RUNS.iloc[:1]).read_text(encoding="utf-8")
     assert "did not converge" not in page

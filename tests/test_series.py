@@ -46,6 +46,12 @@ CLOSED: dict[str, tuple[Callable[[], Series], Array]] = {
     "(1 + a)^-0.4338": (lambda: line(1.0) ** -0.4338, binomials(-0.4338)),
     "(1 + a)^3": (lambda: line(1.0) ** 3, np.array([comb(3, j) for j in J], dtype=float)),
     "(2 + a)^0.7": (lambda: line(2.0) ** 0.7, 2.0**0.7 * binomials(0.7) * 0.5**J),
+    "sin a": (lambda: np.sin(line(0.0)), FACTORIALS * (J % 2) * (-1.0) ** (J // 2)),
+    "cos a": (lambda: np.cos(line(0.0)), FACTORIALS * (1 - J % 2) * (-1.0) ** (J // 2)),
+    "sin (1 + 2 a)": (
+        lambda: np.sin(line(1.0, 2.0)),
+        2.0**J * FACTORIALS * np.array([np.sin(1.0), np.cos(1.0), -np.sin(1.0), -np.cos(1.0)])[J % 4],
+    ),
     "sinh a": (lambda: np.sinh(line(0.0)), FACTORIALS * (J % 2)),
     "cosh a": (lambda: np.cosh(line(0.0)), FACTORIALS * (1 - J % 2)),
     "1/(1 − a)": (lambda: 1.0 / (1.0 - line(0.0)), np.ones(ORDER + 1)),
@@ -99,7 +105,7 @@ def test_a_formula_of_many_parts_sums_to_its_value() -> None:
     def f(x: Any) -> Any:
         return (
             np.tanh(x) * np.sqrt(1.0 + x * x) / np.exp(-x) + np.arcsinh(x) ** 2 - np.cosh(x) / (2.0 + np.log(x)) + 3 / x
-        )
+        ) * np.cos(2.0 * x) - np.sin(x)
 
     x = Series([1.3, 2.0])
     y = f(x)
@@ -160,6 +166,8 @@ def test_functions_and_their_inverses(c: Array) -> None:
     close(np.sinh(np.arcsinh(x)), x)
     close(np.sinh(x) / np.cosh(x), np.tanh(x))
     close(np.cosh(x) ** 2 - np.sinh(x) ** 2, x - x + 1.0)
+    close(np.cos(x) ** 2 + np.sin(x) ** 2, x - x + 1.0)
+    close(2.0 * np.sin(x) * np.cos(x), np.sin(2.0 * x))
 
 
 FORMULAS: list[Callable[[Any], Any]] = [
@@ -167,6 +175,7 @@ FORMULAS: list[Callable[[Any], Any]] = [
     lambda x: np.exp(-x) / x,
     lambda x: np.arcsinh(3.0 * x) / np.sqrt(x),
     lambda x: np.tanh(x) + np.log(x) * np.sinh(x) - np.cosh(x),
+    lambda x: np.sin(x * x) / (2.0 + np.cos(x)),
 ]
 
 

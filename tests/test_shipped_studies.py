@@ -15,13 +15,17 @@ STUDIES = Path(__file__).parent.parent / "studies"
 def test_runs_and_shows_what_it_declares(path, tmp_path):
     results = nlsolve.run(path, tmp_path, quick=True)
     assert results.notes == ()
-    assert set(results.runs["status"]) == {"converged"}
+    # Extremes are there to break; all others converge.
+    assert set(results.runs["status"]) == {"converged"} | ({"ill conditioned"} if path.stem == "extremes" else set())
     assert len(results.runs) == len(results.study.cases)
-    # 12 nodes around a tool whose layer is a fifth of their spacing: a field, but a coarse one.
-    assert results.runs["velocity_error"].between(0.0, 0.3).all()
-    assert (results.runs["residual_norm"] < 1e-5).all()
+    solved = results.runs[results.runs["status"] == "converged"]
+    # 12 nodes around a tool whose layer is a fifth of their spacing: a field, but a coarse one, and it is said so.
+    assert solved["velocity_error"].between(0.0, 0.3).all()
+    assert (solved["doubt"] != "")[solved["velocity_error_inside"] > 0.1].all()
+    assert (solved["residual_norm"] < 1e-5).all()
     for spec in results.study.tables:
-        assert results.table(spec.name).notna().any(axis=1).all(), spec.name
+        filled = results.table(spec.name).notna().any(axis=1)
+        assert filled.any() if spec.cheapest else filled.all(), spec.name  # a coarse cloud reaches few errors
         assert {path.suffix for path in (tmp_path / "tables").glob(f"{spec.name}.*")} == {".csv", ".md", ".tex"}
     for figure in results.study.figures:
         assert (tmp_path / "figures" / f"{figure.name}.png").stat().st_size > 5000

@@ -97,6 +97,100 @@ class TestCases:
         assert (case.setup.scene.side, case.setup.solver) == ("right", Newton())
 
 
+SETTINGS = """each = [
+    { name = "as it is" },
+    { name = "ε₀ = 10", "law.index" = 0.7, scene.side = "right" },
+    { name = "newton", solver = { kind = "newton" } },
+]
+"""
+EACH = STUDY[: STUDY.index("grid = ")] + SETTINGS
+
+
+class TestSettings:
+    def test_named_settings_one_after_the_other(self, tmp_path):
+        cases = read(tmp_path, text=EACH).cases
+        assert [case.parameters["variant"] for case in cases] == ["as it is", "ε₀ = 10", "newton"]
+        assert [case.label for case in cases] == ["as it is", "ε₀ = 10", "newton"]
+        assert [(c.setup.law.index, c.setup.scene.side, c.setup.solver.kind_name()) for c in cases] == [
+            (0.5, "left", "anm"),
+            (0.7, "right", "anm"),
+            (0.5, "left", "newton"),
+        ]
+        assert "solver.order" not in cases[2].parameters  # a table with a kind replaces the section
+        assert next(iter(cases[0].parameters)) == "variant"
+
+    def test_a_name_is_no_part_of_the_identity(self, tmp_path):
+        renamed = read(tmp_path, ("as it is", "baseline"), text=EACH).cases[0]
+        plain = read(tmp_path, text=STUDY[: STUDY.index("[[sweep]]")]).cases[0]
+        assert renamed.id == plain.id == read(tmp_path, text=EACH).cases[0].id
+        assert "variant" not in plain.parameters
+
+    def test_names_are_joined_and_multiply_with_other_sweeps(self, tmp_path):
+        random = '[[sweep]]\neach = [{ name = "a", scene.nodes = { kind = "random" } }]\n'
+        seeds = '[[sweep]]\ngrid = { "scene.nodes.seed" = [1, 2] }\n'
+        cases = read(tmp_path, text=EACH + random + seeds).cases
+        assert [case.label for case in cases[:3]] == [
+            "as it is, a, scene.nodes.seed = 1",
+            "as it is, a, scene.nodes.seed = 2",
+            "ε₀ = 10, a, scene.nodes.seed = 1",
+        ]
+
+    def test_tables_and_figures_may_use_the_variant(self, tmp_path):
+        table = '[[table]]\nname = "t"\nrows = "variant"\nvalue = "seconds"\n'
+        figure = '[[figure]]\nname = "f"\nkind = "map"\nx = "scene.side"\ny = "variant"\n'
+        assert read(tmp_path, text=EACH + table + figure).tables[0].rows == ("variant",)
+        message = complaint(tmp_path, ('y = "variant"', 'y = "varient"'), text=EACH + table + figure)
+        assert "figure[0].y = 'varient': no such column of the results; did you mean 'variant'?" in message
+
+    def test_every_setting_has_its_own_line(self, tmp_path):
+        two = EACH.replace('{ name = "as it is" }', '{ name = "b", "law.index" = -1.0 }').replace("0.7", "-2.0")
+        message = complaint(tmp_path, text=two)
+        assert "line 17: law.index = -1.0:" in message
+        assert "line 18: law.index = -2.0:" in message
+        message = complaint(tmp_path, ('kind = "newton" }', 'kind = "newton", ordr = 3 }'), text=EACH)
+        assert "line 19: solver.ordr = 3: no such field" in message
+
+    def test_the_hand_wins_and_is_named(self, tmp_path):
+        cases = read(tmp_path, text=EACH, overrides={"law.index": 0.9}).cases
+        assert {case.setup.law.index for case in cases} == {0.9}
+        assert "--set: law.index = -1" in complaint(tmp_path, text=EACH, overrides={"law.index": -1})
+
+    def test_quick_may_have_settings_of_its_own(self, tmp_path):
+        quick = '[quick]\nsweep = [{ each = [{ name = "q", "law.index" = 0.2 }] }]\n'
+        assert read(tmp_path, text=EACH + quick, quick=True).cases[0].parameters["variant"] == "q"
+        message = complaint(tmp_path, ("0.2 }", "-0.2 }"), text=EACH + quick, quick=True)
+        assert "line 22: law.index = -0.2:" in message
+
+    def test_two_names_for_one_case(self, tmp_path):
+        message = complaint(tmp_path, ('name = "newton", solver = { kind = "newton" }', 'name = "same"'), text=EACH)
+        assert message == (
+            "/study.toml, line 19: sweep[0].each[2]: 'as it is' and 'same' are one and the same case: "
+            "change one of them, or drop it"
+        )
+        message = complaint(tmp_path, text=EACH, overrides={"law.index": 0.5, "scene.side": "right"})
+        assert "'as it is' and 'ε₀ = 10' are one and the same case with what is set by hand" in message
+
+    def test_names_are_required_and_differ(self, tmp_path):
+        message = complaint(tmp_path, ('name = "newton", ', ""), text=EACH)
+        assert "line 19: sweep[0].each[2].name: required, and missing" in message
+        message = complaint(tmp_path, ('"newton", solver', '"as it is", solver'), text=EACH)
+        assert "sweep[0]" in message
+        assert "2 settings are called 'as it is'; give each its own name" in message
+        assert "nothing is swept" in complaint(tmp_path, text=STUDY[: STUDY.index("grid = ")] + "each = []")
+
+    def test_unknown_names_and_names_swept_twice(self, tmp_path):
+        message = complaint(tmp_path, ('"law.index" = 0.7', '"lwa.index" = 0.7'), text=EACH)
+        assert message == "/study.toml, line 18: lwa.index = []: not a parameter; did you mean 'law'?"
+        again = '[[sweep]]\ngrid = { "law.index" = [1.0] }\n'
+        assert "line 22: law.index = []: swept twice" in complaint(tmp_path, text=EACH + again)
+
+    def test_components_from_python(self):
+        document = {name: value for name, value in tomllib.loads(STUDY).items() if name not in ("table", "quick")}
+        sweep = [{"each": [{"name": "newton", "solver": Newton()}, {"name": "p = 7", "solver": Homotopy(order=7)}]}]
+        cases = Study.from_dict(document | {"sweep": sweep}, registry=REGISTRY).cases
+        assert [case.setup.solver for case in cases] == [Newton(), Homotopy(order=7)]
+
+
 class TestComplaints:
     def test_misspelt_field(self, tmp_path):
         message = complaint(tmp_path, ('kind = "honey"', 'kind = "honey"\nindx = 0.2'))
@@ -172,7 +266,7 @@ class TestComplaints:
 
     def test_sweep_without_values_or_with_two_modes(self, tmp_path):
         assert "'solver.order' has no values" in complaint(tmp_path, ("[10, 20]", "[]"))
-        assert "either grid or zip" in complaint(tmp_path, ("[[table]]", "[[sweep]]\n[[table]]"))
+        assert "a sweep has one of grid, zip and each" in complaint(tmp_path, ("[[table]]", "[[sweep]]\n[[table]]"))
 
     def test_claim_needs_a_solver_that_claims(self, tmp_path):
         assert read(tmp_path, ("[solver]", '[stop]\nkind = "claim"\n[solver]')).cases[0].setup.stop.kind == "claim"

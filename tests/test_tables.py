@@ -13,7 +13,7 @@ from rich.console import Console
 from nlsolve.columns import RUNS
 from nlsolve.errors import StudyError
 from nlsolve.papers import verdict
-from nlsolve.tables import TableSpec, build
+from nlsolve.tables import TableSpec, build, check
 
 
 def runs(**columns) -> pd.DataFrame:
@@ -82,7 +82,7 @@ def test_several_runs_in_one_cell():
 def test_unknown_names():
     with pytest.raises(StudyError, match="table 't': no such column of the results; did you mean 'branches'"):
         build(spec(value="brances"), runs())
-    with pytest.raises(StudyError, match="no case has these values"):
+    with pytest.raises(StudyError, match=r"no case has these values: solver\.order = 11"):
         build(spec(where={"solver.order": 11}), runs())
 
 
@@ -145,6 +145,97 @@ def test_formats():
 def test_a_missing_parameter_is_a_dash():
     frame = runs(**{"solver.order": [10, 10, np.nan, np.nan]})
     assert build(spec(), frame).cells.index.tolist() == [10, "–"]
+
+
+def judged() -> pd.DataFrame:
+    """Four runs of known error and one that diverged."""
+    frame = pd.DataFrame(
+        {
+            "status": ["converged"] * 4 + ["diverged"],
+            "variant": ["a", "b", "c", "d", "e"],
+            "solver.kind": ["anm", "anm", "newton", "newton", "newton"],
+            "solver.exact": [True, False, True, False, True],
+            "seconds": [2.0, 1.0, 3.0, 0.5, 0.1],
+            "velocity_error": [0.0005, 0.008, 0.0009, 0.2, np.nan],
+            "doubt": ["", "too coarse", np.nan, "", ""],
+        }
+    )
+    return frame.reindex(columns=[*dict.fromkeys((*RUNS, *frame))])
+
+
+CHEAPEST = {"cost": "seconds", "error": "velocity_error", "within": [0.01, 0.001]}
+
+
+def test_the_cheapest_within_an_error():
+    table = build(spec(rows=[], columns=[], value=["variant", "seconds"], cheapest=CHEAPEST), judged())
+    assert table.cells.index.tolist() == ["1 %", "0.1 %"]
+    assert table.cells.index.name == "within"
+    assert table.words.to_numpy().tolist() == [["b", "1"], ["a", "2"]]
+    assert table.markdown().splitlines()[2].replace(" ", "") == "|1%|b|1|"
+
+
+def test_the_cheapest_of_each_group_and_none():
+    table = build(spec(rows="solver.kind", columns=[], value=["variant", "solver.exact"], cheapest=CHEAPEST), judged())
+    assert table.cells.index.tolist() == [("1 %", "anm"), ("1 %", "newton"), ("0.1 %", "anm"), ("0.1 %", "newton")]
+    assert table.words["variant"].tolist() == ["b", "c", "a", "c"]
+    assert table.words["solver.exact"].tolist() == ["no", "yes", "yes", "yes"]
+    strict = CHEAPEST | {"within": [1e-3, 6e-4]}
+    table = build(spec(rows=[], columns="solver.kind", value="variant", cheapest=strict), judged())
+    assert table.words.to_numpy().tolist() == [["a", "c"], ["a", "–"]]
+    by_residual = CHEAPEST | {"error": "seconds", "within": [1.5]}
+    assert build(spec(rows=[], columns=[], value="variant", cheapest=by_residual), judged()).cells.index[0] == "1.5"
+
+
+def test_counts_of_outcomes():
+    table = build(spec(rows="solver.kind", columns="outcome", value=[], count=True), judged())
+    assert table.cells.columns.tolist() == ["right", "doubted", "wrong", "diverged"]
+    assert table.cells.to_numpy().tolist() == [[1, 1, 0, 0], [1, 0, 1, 1]]
+    table = build(spec(rows="status", columns=[], value=[], count=True), judged())
+    assert table.cells["runs"].to_dict() == {"converged": 4, "diverged": 1}
+
+
+def test_false_successes_are_a_table():
+    table = build(spec(rows="variant", columns=[], value="outcome"), judged())
+    assert table.cells["outcome"].tolist() == ["right", "doubted", "right", "wrong", "diverged"]
+    wrong = spec(rows="variant", columns=[], value="velocity_error", where={"outcome": "wrong"})
+    assert build(wrong, judged()).cells.index.tolist() == ["d"]
+    lenient = spec(rows="variant", columns=[], value="outcome", accepted=0.3)
+    assert build(lenient, judged()).cells.loc["d", "outcome"] == "right"
+
+
+def test_before_a_run_outcomes_counts_and_winners_are_unknown_but_not_wrong():
+    cases = [{"solver.order": 1}, {"solver.order": 1}]
+    for fields in (
+        {"columns": "outcome", "value": [], "count": True},
+        {"columns": [], "value": "seconds", "cheapest": {}},
+        {"columns": [], "value": [], "count": True},
+    ):
+        assert check(spec(**fields), cases) == []
+    (problem,) = check(spec(columns=[], value="seconds", cheapest={"cost": "secnds"}), cases)
+    assert (problem.place, problem.value) == (("cheapest", "cost"), "secnds")
+    assert "did you mean 'seconds'?" in problem.expected
+
+
+def test_a_kept_declaration_reads_back_the_same():
+    declared = spec(columns=[], value="variant", cheapest=CHEAPEST)
+    assert TableSpec.model_validate(declared.model_dump(mode="json")) == declared
+
+
+@pytest.mark.parametrize(
+    ("fields", "sentence"),
+    [
+        ({"count": True}, "count = true shows numbers of runs; drop value"),
+        ({"count": True, "value": [], "cheapest": {}}, "drop cheapest"),
+        ({"value": []}, "value is required, and missing"),
+        ({"rows": []}, "rows is required, and missing"),
+        ({"cheapest": {}, "paper": {"source": "s", "values": [[1]]}}, "neither with cheapest nor with count"),
+        ({"cheapest": {"within": []}}, "at least 1 item"),
+        ({"accepted": 0}, "greater than 0"),
+    ],
+)
+def test_declarations_that_contradict_themselves(fields, sentence):
+    with pytest.raises(ValidationError, match=sentence):
+        spec(**fields)
 
 
 def test_names_of_files_are_plain():

@@ -1,4 +1,4 @@
-"""Figures a study declares: curves of runs and steps, clouds, profiles and fields, drawn for print.
+"""Figures a study declares: curves, maps and trades of runs, curves of steps, clouds, profiles and fields, for print.
 
 A figure is a validated value like everything else in a study; `draw` turns it and the result frames into a
 `matplotlib.figure.Figure` without touching pyplot, `save` writes it as PNG and PDF, the same bytes every time.
@@ -18,8 +18,10 @@ from nlsolve.figures.base import BaseFigure, FigureError, Frames
 from nlsolve.figures.cloud import CloudFigure
 from nlsolve.figures.field import FieldFigure
 from nlsolve.figures.line import LineFigure
+from nlsolve.figures.map import MapFigure
 from nlsolve.figures.profile import ProfileFigure
 from nlsolve.figures.style import COLUMN, DOTS_PER_INCH, STYLE
+from nlsolve.figures.trade import TradeFigure
 
 __all__ = [
     "BaseFigure",
@@ -29,12 +31,16 @@ __all__ = [
     "FigureSpec",
     "Frames",
     "LineFigure",
+    "MapFigure",
     "ProfileFigure",
+    "TradeFigure",
     "draw",
     "save",
 ]
 
-FigureSpec = Annotated[LineFigure | CloudFigure | ProfileFigure | FieldFigure, Field(discriminator="kind")]
+FigureSpec = Annotated[
+    LineFigure | MapFigure | TradeFigure | CloudFigure | ProfileFigure | FieldFigure, Field(discriminator="kind")
+]
 """What a study's `[[figure]]` may be."""
 
 

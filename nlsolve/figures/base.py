@@ -47,6 +47,10 @@ class BaseFigure(Component, ABC):
         description="parameters that tell curves or panels apart; absent: those that differ, where a case is a curve",
     )
 
+    def columns_of_runs(self) -> dict[str, Names]:
+        """By field: the names a study can be told to be no columns of `runs` before it is run."""
+        return {"where": tuple(self.where), "group": self.group}
+
     @abstractmethod
     def paint(self, figure: Figure, frames: Frames) -> None:
         """Draw on an empty figure."""

@@ -9,8 +9,8 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from nlsolve.columns import RUNS
 from nlsolve.figures.base import BaseFigure, Scalar, listing
+from nlsolve.outcomes import telling
 from nlsolve.status import Status
 
 
@@ -35,7 +35,7 @@ def labelled(spec: BaseFigure, cases: pd.DataFrame, one_case: bool) -> list[tupl
     for column in by:
         spec.require(column, cases, "runs", what="group")
     if not by and one_case and len(cases) > 1:
-        by = _differing(cases) or ["case"]
+        by = telling(cases) or ["case"]
     if not by:
         return [("", cases)]
     groups: dict[tuple[str, ...], list[int]] = {}
@@ -44,22 +44,22 @@ def labelled(spec: BaseFigure, cases: pd.DataFrame, one_case: bool) -> list[tupl
     found = []
     for positions in groups.values():
         members = cases.iloc[positions]
-        label = _label({column: members[column].iloc[0] for column in by})
+        label = label_of({column: members[column].iloc[0] for column in by})
         if one_case and len(members) > 1:
             raise spec.refuse(
                 f"group = {by} leaves {len(members)} cases under the one label {label!r}; "
-                f"they differ in {listing(_differing(members))}: add one to `group`, or choose with `where`"
+                f"they differ in {listing(telling(members))}: add one to `group`, or choose with `where`"
             )
         found.append((label, members))
     return found
 
 
-def _differing(cases: pd.DataFrame) -> list[str]:
-    """Parameters that are not the same in all cases."""
-    return [str(name) for name in cases if name not in RUNS and len({str(value) for value in cases[name]}) > 1]
+def records_of(runs: pd.DataFrame) -> list[dict[str, Any]]:
+    """The runs one by one, in their order."""
+    return [dict(zip(map(str, runs.columns), row, strict=True)) for row in runs.itertuples(index=False)]
 
 
-def _label(parameters: Mapping[str, Any]) -> str:
+def label_of(parameters: Mapping[str, Any]) -> str:
     """{"solver.kind": "anm", "solver.order": 20} -> "anm, order 20"."""
     last = [name.rpartition(".")[2] for name in parameters]
     words = []
@@ -71,14 +71,14 @@ def _label(parameters: Mapping[str, Any]) -> str:
         elif isinstance(value, str):
             words.append(value)
         elif not (value is None or (np.ndim(value) == 0 and pd.isna(value))):
-            words.append(f"{called} {_number(value)}")
-    return ", ".join(words)
+            words.append(f"{called} {number_text(value)}")
+    return ", ".join(filter(None, words))
 
 
-def _number(value: Any) -> str:
+def number_text(value: Any) -> str:
     """20 -> "20", 1e-6 -> "$10^{-6}$"."""
     if np.ndim(value):
-        return "(" + ", ".join(map(_number, value)) + ")"
+        return "(" + ", ".join(map(number_text, value)) + ")"
     if not isinstance(value, (int, float, np.number)):
         return str(value)
     text = f"{value:.6g}"

@@ -1,4 +1,4 @@
-"""Where the material went: the nodes at a time, by the half they started in."""
+"""Where the material went: the nodes, or the markers that left them, at a time, by the half they started in."""
 
 from __future__ import annotations
 
@@ -22,7 +22,10 @@ RING: Any = {"markerfacecolor": "none", "markeredgecolor": ACCENT, "markeredgewi
 
 
 class CloudFigure(PanelsFigure):
-    """The nodes at a time, coloured by the half-disc (sign of y at t = 0) they started in: material mixing."""
+    """The nodes at a time, coloured by the half-disc (sign of y at t = 0) they started in: material mixing.
+
+    Where a case has markers they are drawn in place of its nodes, less those that have left the cloud.
+    """
 
     kind: Literal["cloud"] = "cloud"
     probe: tuple[float, float] | None = Field(None, description="place at t = 0 whose nearest node is marked [mm]")
@@ -40,9 +43,10 @@ class CloudFigure(PanelsFigure):
         figure.legend(handles=handles, loc=off_the_title, ncols=len(handles), handlelength=1)
 
     def _nodes(self, axes: Axes, rows: pd.DataFrame) -> None:
+        nodes, rows = rows[["x", "y"]].to_numpy(float), _material(rows)
         places, start = rows[["x", "y"]].to_numpy(float), rows[["x0", "y0"]].to_numpy(float)
         wall, upper = boundaries(rows) != "", start[:, 1] > 0
-        size = _marker_size(axes, places)
+        size = _marker_size(axes, nodes)
         edge: Any = {"markersize": 1.2 * size, "markeredgecolor": "black", "markeredgewidth": min(0.5, 0.25 * size)}
         for half, (_, colour) in zip((upper, ~upper), HALVES, strict=True):
             axes.plot(*places[half & ~wall].T, "o", color=colour, markersize=size, markeredgewidth=0)
@@ -50,6 +54,14 @@ class CloudFigure(PanelsFigure):
         if self.probe is not None:
             marked = int(np.hypot(*(start - self.probe).T).argmin())
             axes.plot(*places[marked], "o", markersize=max(2.5 * size, 5), **RING)
+
+
+def _material(rows: pd.DataFrame) -> pd.DataFrame:
+    """The rows with the places x, y of their markers where there are any."""
+    marked = rows.reindex(columns=["marker_x", "marker_y"]).notna().all(axis=1)
+    if not marked.any():
+        return rows
+    return rows[marked].assign(x=rows["marker_x"], y=rows["marker_y"])
 
 
 def _marker_size(axes: Axes, places: Array) -> float:

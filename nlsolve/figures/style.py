@@ -6,6 +6,7 @@ import re
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from matplotlib import colormaps
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
@@ -19,11 +20,13 @@ DASHES = ("-", "--", ":", "-.")
 MARKERS = ("o", "s", "^", "D", "v", "<", ">")
 UPPER, LOWER, ACCENT = COLOURS[0], COLOURS[4], "#C00000"
 SIGNED_MAP, POSITIVE_MAP = "RdBu_r", "viridis"
+ERROR_MAP = colormaps["YlGnBu"]
 FAILED = "not converged"  # last in every legend
+IN_DOUBT = "in doubt by its audits"
 MANY_POINTS = 40  # beyond, a curve carries a marker here and there only
 
 STYLE: Any = {
-    "font.family": "STIXGeneral",
+    "font.family": ["STIXGeneral", "DejaVu Serif"],  # the second has the letters the first lacks, such as ₀
     "font.size": 9,
     "mathtext.fontset": "stix",
     "axes.titlesize": 9,
@@ -82,18 +85,23 @@ SYMBOLS: Mapping[str, str] = {
 
 def symbol(column: str) -> str:
     """A column's symbol, or its own name in words."""
-    return SYMBOLS.get(column, column.rpartition(".")[2].replace("_", " "))
+    return SYMBOLS.get(column, column.removesuffix(".kind").rpartition(".")[2].replace("_", " "))
+
+
+def unit(column: str, source: str) -> str:
+    """The unit a column of `runs`, `steps` or `fields` is described with, "[mm/s]"; empty when there is none."""
+    descriptions = {"runs": RUNS, "steps": STEPS, "fields": FIELDS}[source]
+    found = re.search(r"\[[^\]]+\](?!.*\[)", descriptions.get(column, ""))
+    return found[0] if found else ""
 
 
 def axis_label(columns: Sequence[str], source: str) -> str:
     """Symbols and unit of columns of `runs`, `steps` or `fields`, e.g. "$u$, $v$ [mm/s]"."""
-    descriptions = {"runs": RUNS, "steps": STEPS, "fields": FIELDS}[source]
-    found = [re.search(r"\[[^\]]+\](?!.*\[)", descriptions.get(column, "")) for column in columns]
-    units = [match[0] if match else "" for match in found]
+    units = [unit(column, source) for column in columns]
     names = [symbol(column) for column in columns]
     if len(set(units)) == 1:
         return f"{', '.join(names)} {units[0]}".strip()
-    return ", ".join(f"{name} {unit}".strip() for name, unit in zip(names, units, strict=True))
+    return ", ".join(f"{name} {of_it}".strip() for name, of_it in zip(names, units, strict=True))
 
 
 def join(*parts: str | None) -> str:
@@ -128,15 +136,21 @@ def finish(figure: Figure, axes: Axes, title: str | None) -> None:
     handles, labels = axes.get_legend_handles_labels()
     if handles:
         order = sorted(range(len(labels)), key=lambda number: labels[number] == FAILED)
-        _legend_above(figure, [handles[number] for number in order], [labels[number] for number in order])
+        legend_outside(figure, [handles[number] for number in order], [labels[number] for number in order])
 
 
-def _legend_above(figure: Figure, handles: Sequence[Any], labels: Sequence[str]) -> None:
-    """As many columns as fit the paper, which grows by the rows."""
-    longest = max(len(re.sub(r"\\[a-z]+|[${}_^]", "", label)) for label in labels)
+def legend_outside(figure: Figure, handles: Sequence[Any], labels: Sequence[str], edge: str = "upper") -> None:
+    """A legend at the edge of the paper, in as many columns as fit; the paper grows by the rows."""
+    longest = max(map(letters, labels))
     width = figure.get_figwidth() / MILLIMETRE
     columns = max(1, min(len(labels), int((width - 4) // (1.35 * longest + 10))))
     rows = -(-len(labels) // columns)
     columns = -(-len(labels) // rows)
     figure.set_figheight(figure.get_figheight() + 4.6 * rows * MILLIMETRE)
-    figure.legend(handles, labels, loc="outside upper center", ncols=columns)
+    place: Any = f"outside {edge} center"
+    figure.legend(handles, labels, loc=place, ncols=columns)
+
+
+def letters(label: str) -> int:
+    """Letters of a label on paper, without those of its mathematics."""
+    return len(re.sub(r"\\[a-z]+|[${}_^]", "", label))

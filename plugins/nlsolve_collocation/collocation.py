@@ -1,113 +1,166 @@
-"""B and S by moving least squares: strain rates at stress points from nodes, divergence of stress back at nodes."""
+"""B and S by collocation: strain rates at stress points from nodes, and what returns the stress there to the nodes."""
 
 from __future__ import annotations
 
-from typing import Any, Literal, Self
+from abc import abstractmethod
+from collections.abc import Iterator
+from typing import Any, ClassVar, Literal
 
 import numpy as np
-import scipy.sparse as sp
-from pydantic import Field, model_validator
+from pydantic import Field
 
-from nlsolve import Cloud, Discretizer, Operators
-from nlsolve_collocation.least_squares import Supports, monomials, weights
+from nlsolve import Cloud, Discretizer, Operators, SolveError
+from nlsolve_collocation.assembly import Gradient, sparse_rows
+from nlsolve_collocation.conservation import conserving
+from nlsolve_collocation.diagnostics import diagnosis
+from nlsolve_collocation.least_squares import Derivatives, monomials
+from nlsolve_collocation.supports import Supports
 from nlsolve_collocation.triangles import Triangles
 
-GRADIENT = ((1, 0), (0, 1))
+AT_ONCE = 1024  # targets whose local systems are in the cache together
+VALUE, GRADIENT = ((0, 0),), ((1, 0), (0, 1))
 
 
-class MovingLeastSquares(Discretizer):
-    """Collocation with moving least squares derivatives of first order only, once each way.
+class Collocation(Discretizer):
+    """Derivatives of first order only, once each way, by weights at scattered neighbours.
 
-    between : strain rates and stresses live at the midpoints of the cloud's Delaunay edges; no second derivative and no
-              odd-even mode. The default.
-    nodes :   strain rates and stresses live at the nodes (the composed form of the 2015 paper); kept to be compared
-              with: it decouples neighbouring nodes and fails for n → 0.
+    points : between, strain rates and stresses live at the midpoints of the cloud's Delaunay edges, the default: no
+             second derivative and no odd-even mode; or nodes, the composed form of the 2015 paper, kept to be compared
+             with: it decouples neighbouring nodes and fails for n → 0.
+    form :   strong, the divergence of stress is collocated at the nodes; or conservative, S = −Bᵀ A with gradients
+             corrected for the discrete divergence theorem: a symmetric tangent, and a residual with a potential.
 
     The volumetric term has points of its own, about one a node, so that the penalty does not lock: patches of two
-    Delaunay triangles ("pairs"), or the nodes with moving least squares both ways ("nodes").
+    Delaunay triangles ("pairs"), or the nodes with collocation both ways ("nodes").
     """
 
-    kind: Literal["mls"] = "mls"
     points: Literal["between", "nodes"] = Field("between", description="where strain rates and stresses are taken")
+    form: Literal["strong", "conservative"] = Field("strong", description="how stresses act on the nodes")
     volume_points: Literal["pairs", "nodes"] = Field("pairs", description="where the dilatation is taken")
     degree: int = Field(2, ge=1, le=4, description="degree of the polynomials")
-    support: int = Field(10, ge=3, description="nodes around a strain point")
-    force_support: int = Field(12, ge=3, description="stress points around a node")
-    volume_support: int = Field(20, ge=3, description="nodes around a volume point at a node")
-    radius: float | None = Field(None, gt=0, description="influence radius in place of the counts [mm]")
-    weight: Literal["gaussian", "quartic", "spline"] = Field("gaussian", description="weight function of the distance")
-    shape: float = Field(3.0, gt=0, description="of the gaussian: exp(−(shape · distance/radius)²)")
+    balanced: bool = Field(True, description="supports grow until every quadrant that has nodes nearby is served")
 
-    @model_validator(mode="after")
-    def _enough_neighbours(self) -> Self:
-        least = len(monomials(self.degree))
-        for name in ("support", "force_support", "volume_support"):
-            if self.radius is None and getattr(self, name) < least:
-                raise ValueError(
-                    f"{name} = {getattr(self, name)}: polynomials of degree {self.degree} need at least {least} points"
+    weak: ClassVar[float] = 1e-3
+    """Quality of a support below which it is enlarged."""
+    growths: ClassVar[int] = 3
+    """How often a weak support is enlarged, by half each time, before it is refused."""
+
+    @abstractmethod
+    def supports(self, sources: np.ndarray, targets: np.ndarray, role: str, cloud: Cloud | None) -> Supports:
+        """Neighbours for the weights in a role: "strain", "force" or "volume" on a cloud, "value" anywhere."""
+
+    @abstractmethod
+    def local_weights(
+        self, offsets: np.ndarray, radius: np.ndarray, derivatives: Derivatives
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Weights (D, T, k) of D derivatives for neighbours at `offsets` (T, k, 2), and the quality (T,) of the
+        supports: 0 for one that determines nothing.
+        """
+
+    @abstractmethod
+    def refusal(self, count: int, place: np.ndarray, quality: float) -> SolveError | None:
+        """What is wrong with the worst support, of `count` neighbours around `place`; None when it will do."""
+
+    def weights(
+        self, sources: np.ndarray, targets: np.ndarray, role: str, derivatives: Derivatives, cloud: Cloud | None = None
+    ) -> tuple[Supports, np.ndarray]:
+        """Supports and weights (D, T, k) for `derivatives`; weak supports are enlarged.
+
+        Raises SolveError naming the place of a support that stays weak.
+        """
+        supports = self.supports(sources, targets, role, cloud)
+        quality = np.empty(len(targets))
+        found = np.zeros((len(derivatives), *supports.index.shape))
+        renew = np.arange(len(targets))
+        for attempt in range(self.growths + 1):
+            for count, which in _batches(supports.count, renew):
+                offsets = sources[supports.index[which, :count]] - targets[which][:, None]
+                found[:, which, :count], quality[which] = self.local_weights(
+                    offsets, supports.radius[which], derivatives
                 )
-        return self
+            renew = np.flatnonzero(~(quality >= self.weak))
+            larger = np.minimum(supports.count[renew] + (supports.count[renew] + 1) // 2, len(sources) - 1)
+            if attempt == self.growths or not (larger > supports.count[renew]).any():
+                break
+            supports = supports.replaced(renew, Supports.nearest(sources, targets[renew], larger))
+            found = np.pad(found, ((0, 0), (0, 0), (0, supports.index.shape[1] - found.shape[2])))
+            found[:, renew] = 0.0
+        worst = int(np.nan_to_num(quality, nan=0.0).argmin())
+        error = self.refusal(int(supports.count[worst]), targets[worst], float(quality[worst]))
+        if error is not None:
+            raise error
+        return supports, found
 
     def operators(self, cloud: Cloud, volumetric: bool) -> Operators:
         """B, S and, when asked for, B_θ, S_θ."""
-        nodes, interior = cloud.nodes, cloud.interior
         triangles = Triangles.of(cloud)
+        if self.form == "conservative":
+            return self._conservative(cloud, triangles, volumetric)
+        nodes, interior = cloud.nodes, cloud.interior
         points = triangles.midpoints() if self.points == "between" else nodes
-        m, n, f = len(points), len(nodes), len(interior)
-
-        near, (dx, dy) = self._gradient(nodes, points, self.support)
-        u, v = 2 * near, 2 * near + 1
-        strain = _sparse_rows([[(u, dx)], [(v, dy)], [(u, 0.5 * dy), (v, 0.5 * dx)]], (3 * m, 2 * n))
-
-        near, (dx, dy) = self._gradient(points, nodes[interior], self.force_support)
-        xx, yy, xy = near, near + m, near + 2 * m
-        force = _node_major(_sparse_rows([[(xx, dx), (xy, dy)], [(xy, dx), (yy, dy)]], (2 * f, 3 * m)))
-
+        strain = self._gradient(nodes, points, "strain", cloud).strain(len(nodes))
+        force = self._gradient(points, nodes[interior], "force", cloud).divergence_of_stress(len(points))
         if not volumetric:
             return Operators(strain, force, points)
         if self.volume_points == "pairs":
-            return Operators(strain, force, points, *triangles.volumetric())
-        near, (dx, dy) = self._gradient(nodes, nodes, self.volume_support)
-        dilatation = _sparse_rows([[(2 * near, dx), (2 * near + 1, dy)]], (n, 2 * n))
-        near, dx, dy = near[interior], dx[interior], dy[interior]
-        pressure_force = _node_major(_sparse_rows([[(near, dx)], [(near, dy)]], (2 * f, n)))
-        return Operators(strain, force, points, dilatation, pressure_force, nodes)
+            patches = triangles.patches()
+            return Operators(strain, force, points, patches.dilatation, patches.force_per_area(), patches.centres)
+        gradient = self._gradient(nodes, nodes, "volume", cloud)
+        dilatation = gradient.divergence(len(nodes))
+        return Operators(strain, force, points, dilatation, gradient.at(interior).of_pressure(len(nodes)), nodes)
+
+    def _conservative(self, cloud: Cloud, triangles: Triangles, volumetric: bool) -> Operators:
+        nodes = cloud.nodes
+        points, areas = triangles.diamonds() if self.points == "between" else (nodes, triangles.node_areas)
+        gradient = conserving(cloud, points, areas, self._gradient(nodes, points, "strain", cloud))
+        strain = gradient.strain(len(nodes))
+        if not volumetric:
+            return Operators.conservative(cloud, strain, points, areas, triangles.node_areas)
+        if self.volume_points == "pairs":
+            patches = triangles.patches()
+            volume = (patches.dilatation, patches.centres, patches.areas)
+        else:
+            gradient = conserving(cloud, nodes, triangles.node_areas, self._gradient(nodes, nodes, "volume", cloud))
+            volume = (gradient.divergence(len(nodes)), nodes, triangles.node_areas)
+        return Operators.conservative(cloud, strain, points, areas, triangles.node_areas, *volume)
 
     def gradient(self, cloud: Cloud) -> tuple[Any, Any]:
         """∂/∂x and ∂/∂y at the nodes."""
-        near, derivatives = self._gradient(cloud.nodes, cloud.nodes, self.volume_support)
-        shape = (len(cloud.nodes), len(cloud.nodes))
-        dx, dy = (_sparse_rows([[(near, derivative)]], shape) for derivative in derivatives)
-        return dx, dy
+        return self._gradient(cloud.nodes, cloud.nodes, "volume", cloud).matrices(len(cloud.nodes))
 
     def values(self, sources: np.ndarray, targets: np.ndarray) -> Any:
-        """Sparse (T, N) matrix of moving least squares values."""
-        supports = self._supports(sources, targets, self.support)
-        (value,) = weights(sources, targets, supports, self.degree, ((0, 0),), self.weight, self.shape)
-        return _sparse_rows([[(supports.index, value)]], (len(targets), len(sources)))
+        """Sparse (T, N) matrix of values."""
+        supports, (value,) = self.weights(sources, targets, "value", VALUE)
+        return sparse_rows([[(supports.index, value)]], (len(targets), len(sources)))
 
-    def _supports(self, sources: np.ndarray, targets: np.ndarray, count: int) -> Supports:
-        if self.radius is None:
-            return Supports.nearest(sources, targets, count)
-        return Supports.within(sources, targets, self.radius)
+    def diagnostics(self, cloud: Cloud) -> list[dict[str, Any]]:
+        """A row each for the strain, force and volume weights of a cloud."""
+        points = Triangles.of(cloud).midpoints() if self.points == "between" else cloud.nodes
+        roles = {
+            "strain": (cloud.nodes, points),
+            "force": (points, cloud.nodes[cloud.interior]),
+            "volume": (cloud.nodes, cloud.nodes),
+        }
+        rows = []
+        for role, (sources, targets) in roles.items():
+            plain = self.with_(balanced=False).supports(sources, targets, role, cloud)
+            supports, weights = self.weights(sources, targets, role, GRADIENT, cloud)
+            row = diagnosis(sources, targets, supports, weights, self.degree)
+            rows.append({"operator": role, **row, "grown": int((supports.count > plain.count).sum())})
+        return rows
 
-    def _gradient(self, sources: np.ndarray, targets: np.ndarray, count: int) -> tuple[np.ndarray, list[np.ndarray]]:
-        """Neighbours (T, k) and the weights (T, k) of ∂/∂x and ∂/∂y."""
-        supports = self._supports(sources, targets, count)
-        return supports.index, weights(sources, targets, supports, self.degree, GRADIENT, self.weight, self.shape)
-
-
-def _sparse_rows(blocks: list[list[tuple[np.ndarray, np.ndarray]]], shape: tuple[int, int]) -> Any:
-    """CSR matrix of stacked blocks of rows; a block joins (columns, values) pairs, (T, k) each, side by side."""
-    columns = [np.concatenate([pair[0] for pair in block], axis=1) for block in blocks]
-    values = [np.concatenate([pair[1] for pair in block], axis=1) for block in blocks]
-    lengths = np.concatenate([np.full(len(block), block.shape[1]) for block in columns])
-    starts = np.concatenate([[0], np.cumsum(lengths)])
-    return sp.csr_array(
-        (np.concatenate([v.ravel() for v in values]), np.concatenate([c.ravel() for c in columns]), starts), shape=shape
-    )
+    def _gradient(self, sources: np.ndarray, targets: np.ndarray, role: str, cloud: Cloud) -> Gradient:
+        supports, (dx, dy) = self.weights(sources, targets, role, GRADIENT, cloud)
+        return Gradient(supports.index, dx, dy)
 
 
-def _node_major(matrix: Any) -> Any:
-    """Rows x_0 … x_F, y_0 … y_F brought into the order x_0, y_0, x_1, …"""
-    return matrix[np.arange(matrix.shape[0]).reshape(2, -1).T.ravel()]
+def _batches(counts: np.ndarray, targets: np.ndarray) -> Iterator[tuple[int, np.ndarray]]:
+    """The targets (a part of all) that have equally many neighbours, AT_ONCE or fewer at a time."""
+    for count in np.unique(counts[targets]):
+        alike = targets[counts[targets] == count]
+        yield from ((int(count), alike[begin : begin + AT_ONCE]) for begin in range(0, len(alike), AT_ONCE))
+
+
+def least_count(degree: int) -> int:
+    """Number of monomials up to the degree: a support needs as many neighbours."""
+    return len(monomials(degree))

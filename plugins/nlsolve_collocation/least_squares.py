@@ -10,15 +10,11 @@ Lancaster & Salkauskas (1981); Timesli et al. (2015), section 3.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from math import factorial
 
 import numpy as np
-from scipy.spatial import cKDTree
 
-from nlsolve import SolveError, Status
-
-SMALLEST_PIVOT = 1e-8  # of R, relative to its column: below, the support does not determine the polynomial
+Derivatives = tuple[tuple[int, int], ...]
 
 
 def weight_function(name: str, s: np.ndarray, shape: float) -> np.ndarray:
@@ -31,54 +27,20 @@ def weight_function(name: str, s: np.ndarray, shape: float) -> np.ndarray:
     return (1.0 - inside) ** 3 * (1.0 + 3.0 * inside)  # 1 − 6 s² + 8 s³ − 3 s⁴, never below zero by rounding
 
 
-@dataclass(frozen=True)
-class Supports:
-    """The neighbours of T targets among the sources: `index` (T, k), `radius` (T,) [mm] of each support."""
-
-    index: np.ndarray
-    radius: np.ndarray
-
-    @classmethod
-    def nearest(cls, sources: np.ndarray, targets: np.ndarray, count: int) -> Supports:
-        """The `count` nearest sources; the radius lies half-way to the next one."""
-        if len(sources) <= count:
-            raise SolveError(
-                Status.BAD_CLOUD, f"a support of {count} neighbours was asked for among {len(sources)} points"
-            )
-        distance, index = cKDTree(sources).query(targets, count + 1)
-        farthest, next_one = distance[:, count - 1], distance[:, count]
-        # On a regular grid the two tie, and a source on the rim would weigh nothing: the rim lies just beyond it.
-        return cls(index[:, :count], np.maximum(0.5 * (farthest + next_one), 1.001 * farthest))
-
-    @classmethod
-    def within(cls, sources: np.ndarray, targets: np.ndarray, radius: float) -> Supports:
-        """All sources nearer than `radius`. Short supports are filled up with farther points, which weigh nothing."""
-        tree = cKDTree(sources)
-        most = int(tree.query_ball_point(targets, radius, return_length=True).max())
-        _, index = tree.query(targets, min(most, len(sources)))
-        return cls(index, np.full(len(targets), radius))
-
-
 def monomials(degree: int) -> list[tuple[int, int]]:
     """Exponents (i, j) of x^i y^j up to the total degree, lowest first."""
     return [(total - j, j) for total in range(degree + 1) for j in range(total + 1)]
 
 
-def weights(
-    sources: np.ndarray,
-    targets: np.ndarray,
-    supports: Supports,
-    degree: int,
-    derivatives: tuple[tuple[int, int], ...],
-    weight: str,
-    shape: float,
-) -> list[np.ndarray]:
-    """φ for each derivative ∂^(i+j)/∂x^i∂y^j asked for: a (T, k) array each.
+def fit(
+    offsets: np.ndarray, radius: np.ndarray, degree: int, derivatives: Derivatives, weight: str, shape: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """φ (D, T, k) for each of D derivatives ∂^(i+j)/∂x^i∂y^j, from neighbours at `offsets` (T, k, 2) of T targets.
 
-    Raises SolveError (bad cloud) naming the first target whose support does not determine a polynomial of `degree`.
+    Also the smallest pivot of R relative to its column, (T,): 1 for orthogonal monomials, 0 where the support does not
+    determine a polynomial of `degree` and φ means nothing.
     """
-    offsets = (sources[supports.index] - targets[:, None]) / supports.radius[:, None, None]
-    x, y = np.ascontiguousarray(offsets.transpose(2, 1, 0))  # (k, T) each
+    x, y = np.ascontiguousarray((offsets / radius[:, None, None]).transpose(2, 1, 0))  # (k, T) each
     distance = np.hypot(x, y)
     root = np.sqrt(np.where(distance < 1.0, weight_function(weight, distance, shape), 0.0))
     exponents = monomials(degree)
@@ -96,20 +58,11 @@ def weights(
                 column -= overlap * q[b]
         r[c, c] = np.sqrt(np.einsum("kt,kt->t", column, column))
         smallest = np.minimum(smallest, r[c, c] / np.maximum(length, np.finfo(float).tiny))
-        # A vanished column leaves Q undefined there; the check below names the place.
+        # A vanished column leaves Q undefined there; the smallest pivot tells.
         q[c] = column / np.where(r[c, c] > 0.0, r[c, c], 1.0)
-    worst = int(smallest.argmin())
-    if not smallest[worst] > SMALLEST_PIVOT:
-        place = ", ".join(f"{coordinate:.6g}" for coordinate in targets[worst])
-        raise SolveError(
-            Status.BAD_CLOUD,
-            f"the {x.shape[0]} neighbours of the point ({place}) do not determine a polynomial of degree {degree}: "
-            "widen the supports or lower the degree",
-        )
-    return [
-        _of_functional(q, r, exponents.index(derivative), derivative, root, supports.radius)
-        for derivative in derivatives
-    ]
+    r[np.arange(count), np.arange(count)] = np.where(smallest > 0.0, r[np.arange(count), np.arange(count)], 1.0)
+    phi = [_of_functional(q, r, exponents.index(d), d, root, radius) for d in derivatives]
+    return np.stack(phi), smallest
 
 
 def _of_functional(

@@ -3,6 +3,8 @@
 The mean of div v over a patch of two linear triangles is taken at about one patch per node; a volumetric penalty on
 every triangle or strain point would lock. S_θ = −A_i⁻¹ B_θᵀ A, the conservative partner of B_θ, keeps the penalty
 semi-definite, so that no λ can make the tangent singular, and a constant pressure exerts no force.
+
+Linear triangles themselves are the smallest conservative discretisation: ∇φ of hat functions, one point a triangle.
 """
 
 from __future__ import annotations
@@ -93,26 +95,73 @@ class Triangles:
             free[merged.ravel()] = False
             left = free[sides].all(axis=1)
             sides, rank = sides[left], rank[left]
-        return np.unique(patch, return_inverse=True)[1]
+        return np.unique(self._without_held_patches(patch, beside[inner]), return_inverse=True)[1]
 
-    def volumetric(self) -> tuple[Any, Any, np.ndarray]:
-        """B_θ (L, 2N), S_θ (2F, L) and the centres (L, 2) of the patches."""
-        nodes, corners, areas = self.cloud.nodes, self.corners, self.areas
-        # 2 A ∂/∂x of the linear hat function of a corner is the difference of y across the opposite side.
-        ahead, behind = nodes[corners[:, [1, 2, 0]]], nodes[corners[:, [2, 0, 1]]]
-        flux = 0.5 * np.stack([ahead[..., 1] - behind[..., 1], behind[..., 0] - ahead[..., 0]], axis=-1)  # (T, 3, 2)
+    def _without_held_patches(self, patch: np.ndarray, sides: np.ndarray) -> np.ndarray:
+        """Patches whose nodes all lie on walls joined to a neighbour: no unknown could change their dilatation."""
+        moves = ~self.cloud.on_boundary[self.corners].all(axis=1)
+        while True:
+            held = np.bincount(patch, moves, len(patch))[patch] == 0.0
+            exits = sides[held[sides[:, 0]] != held[sides[:, 1]]]
+            if not len(exits):
+                return patch
+            inner = held[exits[:, 0]]
+            ours = patch[np.where(inner, exits[:, 0], exits[:, 1])]
+            theirs = patch[np.where(inner, exits[:, 1], exits[:, 0])]
+            joined = np.arange(len(patch))
+            joined[ours] = theirs
+            patch = joined[patch]
+
+    @cached_property
+    def hat_gradients(self) -> np.ndarray:
+        """∇ of the linear hat function of each corner times the triangle's area, (T, 3, 2) [mm]."""
+        ahead, behind = self.cloud.nodes[self.corners[:, [1, 2, 0]]], self.cloud.nodes[self.corners[:, [2, 0, 1]]]
+        return 0.5 * np.stack([ahead[..., 1] - behind[..., 1], behind[..., 0] - ahead[..., 0]], axis=-1)
+
+    @cached_property
+    def node_areas(self) -> np.ndarray:
+        """A third of the triangles around each node, (N,) [mm²]."""
+        return np.bincount(self.corners.ravel(), np.repeat(self.areas / 3.0, 3), len(self.cloud.nodes))
+
+    def centroids(self) -> np.ndarray:
+        """(T, 2) [mm]."""
+        return self.cloud.nodes[self.corners].mean(axis=1)
+
+    def diamonds(self) -> tuple[np.ndarray, np.ndarray]:
+        """Midpoints (E, 2) of all edges, and a third of the triangles beside each, (E,) [mm²]: they fill the cloud."""
+        ends, beside = self.edges
+        areas = np.where(beside >= 0, self.areas[beside], 0.0).sum(axis=1) / 3.0
+        return self.cloud.nodes[ends].mean(axis=1), areas
+
+    def patches(self) -> Patches:
+        """The mean of div v over each patch of `pairs`."""
+        corners, areas = self.corners, self.areas
         patch = self.pairs()
         count = int(patch.max()) + 1
         columns = 2 * corners[:, :, None] + np.arange(2)
         rows = np.broadcast_to(patch[:, None, None], columns.shape)
+        shape = (count, 2 * len(self.cloud.nodes))
         # Patch area times mean divergence: the net flux out of each patch.
-        net_flux = sp.csr_array((flux.ravel(), (rows.ravel(), columns.ravel())), shape=(count, 2 * len(nodes)))
-        patch_area = np.bincount(patch, areas, count)
-        node_area = np.bincount(corners.ravel(), np.repeat(areas / 3.0, 3), len(nodes))
-        free = np.stack([2 * self.cloud.interior, 2 * self.cloud.interior + 1], axis=1).ravel()
-        dilatation = sp.diags_array(1.0 / patch_area) @ net_flux
-        per_area = sp.diags_array(-1.0 / np.repeat(node_area[self.cloud.interior], 2))
-        pressure_force = per_area @ net_flux[:, free].T
-        centroids = nodes[corners].mean(axis=1)
-        centres = np.stack([np.bincount(patch, areas * c, count) / patch_area for c in centroids.T], axis=1)
-        return dilatation.tocsr(), pressure_force.tocsr(), centres
+        net_flux = sp.csr_array((self.hat_gradients.ravel(), (rows.ravel(), columns.ravel())), shape=shape)
+        patch_areas = np.bincount(patch, areas, count)
+        dilatation = (sp.diags_array(1.0 / patch_areas) @ net_flux).tocsr()
+        centres = np.stack([np.bincount(patch, areas * c, count) / patch_areas for c in self.centroids().T], axis=1)
+        return Patches(self, dilatation, net_flux, patch_areas, centres)
+
+
+@dataclass(frozen=True)
+class Patches:
+    """Volume points of a triangulation: B_θ (L, 2N), its rows times the areas (L,) [mm²], and centres (L, 2) [mm]."""
+
+    triangles: Triangles
+    dilatation: Any
+    net_flux: Any
+    areas: np.ndarray
+    centres: np.ndarray
+
+    def force_per_area(self) -> Any:
+        """S_θ = −W⁻¹ B_θᵀ A (2F, L) at the interior nodes, per area W of their material."""
+        inside = self.triangles.cloud.interior
+        free = np.stack([2 * inside, 2 * inside + 1], axis=1).ravel()
+        per_area = sp.diags_array(-1.0 / np.repeat(self.triangles.node_areas[inside], 2))
+        return (per_area @ self.net_flux[:, free].T).tocsr()

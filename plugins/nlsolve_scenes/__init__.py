@@ -5,11 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from nlsolve import Component, hookimpl
+from nlsolve_scenes.cavity import Cavity
 from nlsolve_scenes.channel import Channel
 from nlsolve_scenes.couette import Couette
+from nlsolve_scenes.eccentric import EccentricCylinders
+from nlsolve_scenes.manufactured import Manufactured
 from nlsolve_scenes.stirring_tool import StirringTool
 
 
 @hookimpl
 def nlsolve_components() -> Iterable[type[Component]]:
-    return [StirringTool, Channel, Couette]
+    return [StirringTool, Channel, Couette, EccentricCylinders, Cavity, Manufactured]

@@ -8,6 +8,8 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from nlsolve import Cloud, ConstitutiveLaw, Exact, Scene
+from nlsolve_scenes.files import NodeFile
+from nlsolve_scenes.scatter import jittered, scatter
 
 
 class Channel(Scene):
@@ -21,8 +23,11 @@ class Channel(Scene):
     length: float = Field(2.0, gt=0, description="L [mm]")
     mean_speed: float = Field(100.0, gt=0, description="mean velocity of the pure power law, which sets G [mm/s]")
     spacing: float = Field(0.1, gt=0, description="distance of nodes [mm]")
-    jitter: float = Field(0.0, ge=0, lt=0.5, description="random shift of interior nodes, part of the spacing")
-    seed: int = Field(0, ge=0, description="of the random shifts")
+    nodes: Literal["grid", "scattered"] | NodeFile = Field(
+        "grid", description="a regular grid, scattered nodes, or those of a file"
+    )
+    jitter: float = Field(0.0, ge=0, lt=0.5, description="random shift of inner nodes, part of the nearest distance")
+    seed: int = Field(0, ge=0, description="of everything random in the nodes")
 
     @model_validator(mode="after")
     def _steady_on_fixed_nodes(self) -> Self:
@@ -36,19 +41,12 @@ class Channel(Scene):
         return self.mean_speed / self.half_height
 
     def cloud(self, law: ConstitutiveLaw) -> Cloud:
-        """A regular grid, jittered inside; boundary groups "bottom", "top", "inlet", "outlet"."""
-        columns = max(2, round(self.length / self.spacing)) + 1
-        rows = max(2, round(2.0 * self.half_height / self.spacing)) + 1
-        x, y = np.meshgrid(
-            np.linspace(0.0, self.length, columns), np.linspace(-self.half_height, self.half_height, rows)
-        )
-        nodes = np.stack([x.ravel(), y.ravel()], axis=1)
-        number = np.arange(rows * columns).reshape(rows, columns)
-        boundaries = {"bottom": number[0], "top": number[-1], "inlet": number[1:-1, 0], "outlet": number[1:-1, -1]}
-        interior = number[1:-1, 1:-1].ravel()
-        shifts = np.random.default_rng(self.seed).uniform(-1.0, 1.0, (len(interior), 2))
-        nodes[interior] += self.jitter * self.spacing * shifts
-        return Cloud(nodes, boundaries)
+        """The nodes asked for, jittered inside; boundary groups "bottom", "top", "inlet", "outlet"."""
+        if isinstance(self.nodes, NodeFile):
+            cloud = self.nodes.cloud(("bottom", "top", "inlet", "outlet"))
+        else:
+            cloud = self._grid() if self.nodes == "grid" else self._scattered(self._grid())
+        return jittered(cloud, self.jitter, self.seed)
 
     def boundary_position(self, cloud: Cloud, time: float) -> np.ndarray:
         """Where they were."""
@@ -70,6 +68,27 @@ class Channel(Scene):
             return None
         velocity, gradient = self._profile(law, points)
         return Exact(velocity, {"pressure_gradient": gradient})
+
+    def _grid(self) -> Cloud:
+        columns = max(2, round(self.length / self.spacing)) + 1
+        rows = max(2, round(2.0 * self.half_height / self.spacing)) + 1
+        x, y = np.meshgrid(
+            np.linspace(0.0, self.length, columns), np.linspace(-self.half_height, self.half_height, rows)
+        )
+        number = np.arange(rows * columns).reshape(rows, columns)
+        boundaries = {"bottom": number[0], "top": number[-1], "inlet": number[1:-1, 0], "outlet": number[1:-1, -1]}
+        return Cloud(np.stack([x.ravel(), y.ravel()], axis=1), boundaries)
+
+    def _scattered(self, grid: Cloud) -> Cloud:
+        """The walls of the grid, and scattered nodes between them."""
+        walls = {name: grid.nodes[group] for name, group in grid.boundaries.items()}
+        middle, reach = np.array([0.5 * self.length, 0.0]), np.array([0.5 * self.length, self.half_height])
+        return scatter(
+            walls,
+            lambda points: (np.abs(points - middle) < reach).all(axis=1),
+            lambda points: np.full(len(points), self.spacing),
+            self.seed,
+        )
 
     def _profile(self, law: ConstitutiveLaw, points: np.ndarray) -> tuple[np.ndarray, float]:
         """Exact velocity (N, 2) and G. Raises ValueError for a law that is no power law."""

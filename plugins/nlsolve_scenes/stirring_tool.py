@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
-from typing import Literal, Self
+from typing import Annotated, Literal, Self
 
 import numpy as np
 from pydantic import Field, model_validator
 
-from nlsolve import Cloud, ConstitutiveLaw, Exact, Scene
-from nlsolve_scenes.rings import RingNodes, Rings, nodes_on_rings
+from nlsolve import Cloud, ConstitutiveLaw, Exact, Scene, SolveError, Status, local_index
+from nlsolve_scenes.files import NodeFile
+from nlsolve_scenes.rings import Auto, GradedRings, Rings, Scattered
+
+Nodes = Annotated[Rings | GradedRings | Scattered | Auto | NodeFile, Field(discriminator="kind")]
+ON_CIRCLE = 1e-3  # largest distance of a wall's node of a file from its circle, in radii
+THINNEST = 1e-3  # least local index from which a layer is taken; a perfectly plastic law has none
 
 
 class StirringTool(Scene):
@@ -29,7 +34,7 @@ class StirringTool(Scene):
     tool_radius: float = Field(1.5, gt=0, description="r_t [mm]")
     plate_radius: float = Field(6.0, gt=0, description="r_p [mm]")
     angular_speed: float = Field(100.0, gt=0, description="ω [rad/s]")
-    nodes: RingNodes = Field(default_factory=Rings, description="node set: rings or graded-rings")
+    nodes: Nodes = Field(default_factory=Rings, description="node set: rings, graded-rings, scattered, auto or file")
 
     @model_validator(mode="after")
     def _radii_in_order(self) -> Self:
@@ -44,13 +49,37 @@ class StirringTool(Scene):
         """Tool speed over tool radius, ω."""
         return self.angular_speed
 
+    def layer(self, law: ConstitutiveLaw) -> float:
+        """Distance over which the strain rate at the tool falls by e [mm]; at most a quarter of the gap.
+
+        spin : r_t n/2, as τ r² is constant and dr/r = −½ d log τ = −(n/2) d log γ̇; there γ̇ = 2 ω/n for a power law.
+        orbit: r_t n² at the sides of the tool, as measured for power laws (0.022 mm for n = 0.1324); there γ̇ ~ ω/n².
+
+        n is the local index of the law at that rate, ε̄ = γ̇/√3, found by iteration.
+        """
+        n = 1.0
+        for _ in range(30):
+            rate = (2.0 / n if self.motion == "spin" else 1.0 / n**2) * self.angular_speed / np.sqrt(3.0)
+            n = max(local_index(law, rate), THINNEST)
+        layer = self.tool_radius * (0.5 * n if self.motion == "spin" else n**2)
+        return min(layer, 0.25 * (self.plate_radius - self.tool_radius))
+
     def cloud(self, law: ConstitutiveLaw) -> Cloud:
-        """Rings of nodes; boundary groups "tool" and "plate"."""
-        nodes, counts = nodes_on_rings(*self.nodes.radii(self.tool_radius, self.plate_radius))
-        return Cloud(
-            nodes,
-            {"tool": np.arange(counts[0]), "plate": np.arange(len(nodes) - counts[-1], len(nodes))},
-        )
+        """The nodes asked for; boundary groups "tool" and "plate"."""
+        if not isinstance(self.nodes, NodeFile):
+            nodes = self.nodes.rings(self.layer(law)) if isinstance(self.nodes, Auto) else self.nodes
+            return nodes.cloud(self.tool_radius, self.plate_radius)
+        cloud = self.nodes.cloud(("tool", "plate"))
+        for group, radius in (("tool", self.tool_radius), ("plate", self.plate_radius)):
+            found = np.hypot(*cloud.nodes[cloud.boundaries[group]].T)
+            worst = found[np.abs(found - radius).argmax()]
+            if abs(worst - radius) > ON_CIRCLE * radius:
+                raise SolveError(
+                    Status.BAD_CLOUD,
+                    f"{self.nodes.path}: a node of the group {group!r} lies at r = {worst:.6g} mm, "
+                    f"{group}_radius = {radius:g} mm: change one of them",
+                )
+        return cloud
 
     def boundary_position(self, cloud: Cloud, time: float) -> np.ndarray:
         """The tool's nodes turned by ωt, or shifted by r_t (−sin ωt, 1 − cos ωt); the plate's where they were."""

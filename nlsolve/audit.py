@@ -1,0 +1,152 @@
+"""How large is what a scene left out? Every missing term, estimated from the solution itself.
+
+    ρ ∂V/∂t, ρ (V·∇) V beside ∇S      div V beside ε̄      ε₀ beside ε̄      h ∇∇V beside ∇V      S:ε̇/(ρ c_p) beside T
+
+N nodes, M strain points. An audit above its limit names the switch to turn on. A term the scene keeps has no audit
+(NaN). All but the heating put the result itself in doubt.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from nlsolve.discretizers import Discretizer
+from nlsolve.flow import Flow
+from nlsolve.laws import CONTRACTION, rate_squared, stress
+from nlsolve.measures import divergence
+from nlsolve.scenes import Scene
+from nlsolve.series import Array
+from nlsolve.status import SolveError
+
+HEAT_CAPACITY = 8.6e8
+"""c_p of aluminium [mm²/(s² K)]."""
+
+NEAR_REGULARIZATION = 10.0
+"""ε₀ acts where ε̄ < 10 ε₀: at that rate it changes ε̄² by a hundredth."""
+
+NEIGHBOURS = 6
+
+
+@dataclass(frozen=True)
+class Limit:
+    """The largest value that passes without a word, and the word."""
+
+    largest: float
+    sentence: str
+    doubt: bool = True
+
+
+LIMITS: dict[str, Limit] = {
+    "audit.inertia": Limit(0.05, "inertia is not negligible: set inertia = true"),
+    "audit.convection": Limit(0.05, "convection is not negligible: set convection = true"),
+    "audit.compressibility": Limit(0.05, "the material is compressed: raise the penalty, or ask for a divergence"),
+    "audit.regularization_strain": Limit(0.02, "the regularization rules much of the flow: lower law.regularization"),
+    "audit.resolution": Limit(1 / 3, "the nodes are too far apart for the layers: choose a finer spacing there"),
+    "audit.heating": Limit(50.0, "temperature is constant here: the material would heat up and soften", doubt=False),
+}
+
+
+def audit(
+    scene: Scene, discretizer: Discretizer, flow: Flow, velocity: Array, change: Array | None, time: float
+) -> dict[str, Any]:
+    """The columns `audit.…` and `doubt` of a solved flow with `velocity` (N, 2).
+
+    change : ∂V/∂t (N, 2) [mm/s²] over the last increment, of moving nodes dV/dt; None for a steady scene.
+    time : reached by the march [s], 0 for a steady scene.
+    """
+    try:
+        gradient = discretizer.gradient(flow.cloud)
+        to_nodes = discretizer.values(flow.operators.strain_points, flow.cloud.nodes)
+    except SolveError as error:
+        return {"doubt": f"the audits could not be made: {error.detail}"}
+    strain_rate = (flow.operators.strain @ velocity.ravel()).reshape(3, -1)
+    slopes = np.stack([derivative @ velocity for derivative in gradient])  # (2, N, 2): ∂/∂x and ∂/∂y of u, v
+    found = {
+        **_accelerations(scene, flow, velocity, change, slopes, _stress_slopes(flow, strain_rate, gradient, to_nodes)),
+        "audit.compressibility": _compressibility(flow, velocity, slopes),
+        **_regularization(flow, strain_rate),
+        "audit.resolution": _resolution(flow, velocity, slopes),
+        "audit.heating": _heating(scene, flow, strain_rate, time),
+    }
+    doubts = [limit.sentence for name, limit in LIMITS.items() if limit.doubt and found[name] > limit.largest]
+    return found | {"doubt": "; ".join(doubts)}
+
+
+def _ratio(above: float | np.floating[Any], below: float | np.floating[Any]) -> float:
+    return float(above / below) if below > 0.0 else float("nan")
+
+
+def _stress_slopes(flow: Flow, strain_rate: Array, gradient: tuple[Any, Any], to_nodes: Any) -> float:
+    """‖∇S‖₂ over the interior nodes: the size of div S before its parts and the pressure cancel."""
+    at_nodes = stress(flow.law, strain_rate) @ to_nodes.T
+    slopes = np.stack([at_nodes @ derivative.T for derivative in gradient])[..., flow.cloud.interior]
+    return float(np.sqrt(np.einsum("c,acn,acn", CONTRACTION, slopes, slopes)))
+
+
+def _accelerations(
+    scene: Scene, flow: Flow, velocity: Array, change: Array | None, slopes: Array, stress_slopes: float
+) -> dict[str, float]:
+    """‖ρ ∂V/∂t‖/‖∇S‖ and ‖ρ (V·∇) V‖/‖∇S‖ over the interior nodes, each where the scene has no such term."""
+    inside = flow.cloud.interior
+    missing = {}
+    if change is not None and not scene.inertia:
+        missing["audit.inertia"] = change
+    if scene.motion_of_nodes == "fixed" and not scene.convection:
+        missing["audit.convection"] = np.einsum("na,anc->nc", velocity, slopes)
+    nothing = {"audit.inertia": np.nan, "audit.convection": np.nan}
+    return nothing | {
+        name: _ratio(scene.density * np.linalg.norm(acceleration[inside]), stress_slopes)
+        for name, acceleration in missing.items()
+    }
+
+
+def _compressibility(flow: Flow, velocity: Array, slopes: Array) -> float:
+    """‖div V‖/‖ε̄‖, where the volumetric term takes it, or at the interior nodes."""
+    if flow.dilatation_rate(flow.unknowns(velocity)) is not None:
+        return divergence(flow, velocity)
+    (exx, vx), (uy, eyy) = slopes[:, flow.cloud.interior].transpose(0, 2, 1)
+    rate = np.sqrt(rate_squared(np.stack([exx, eyy, 0.5 * (uy + vx)])))
+    return _ratio(np.linalg.norm(exx + eyy), np.linalg.norm(rate))
+
+
+def _regularization(flow: Flow, strain_rate: Array) -> dict[str, float]:
+    """Shares of the strain points with ε̄ < 10 ε₀, of Σ |S| and of Σ ε̄ that they carry.
+
+    The last tells what ε₀ does to velocities: 0.002, 0.02 and 0.07 of it change the steady spin inside by 0.9 %, 8 %
+    and 22 %, whatever the share of the stress.
+    """
+    names = ("audit.regularization", "audit.regularization_stress", "audit.regularization_strain")
+    regularization = getattr(flow.law, "regularization", None)
+    if regularization is None:
+        return dict.fromkeys(names, np.nan)
+    rate = np.sqrt(rate_squared(strain_rate))
+    slow = rate < NEAR_REGULARIZATION * regularization
+    carried = (np.ones_like(rate), np.sqrt(CONTRACTION @ stress(flow.law, strain_rate) ** 2), rate)
+    return {name: _ratio(part[slow].sum(), part.sum()) for name, part in zip(names, carried, strict=True)}
+
+
+def _resolution(flow: Flow, velocity: Array, slopes: Array) -> float:
+    """‖V_j − V_i − ½ (∇V_i + ∇V_j)·(x_j − x_i)‖ / ‖V_j − V_i‖ over pairs of neighbouring interior nodes.
+
+    Large where a layer is thinner than the spacing, and where velocities alternate from node to node unseen by their
+    gradients. Steady spin by moving least squares, eight clouds and forms, four indices: below 0.23 where the error
+    inside is below 2 %, above 0.5 where it is above 9 %. A velocity that is wrong yet smooth is not noticed.
+    """
+    nodes = flow.cloud.nodes
+    near = cKDTree(nodes).query(nodes, min(NEIGHBOURS + 1, len(nodes)))[1][:, 1:]
+    i, j = np.repeat(np.arange(len(nodes)), near.shape[1]), near.ravel()
+    inner = ~(flow.cloud.on_boundary[i] | flow.cloud.on_boundary[j])
+    i, j = i[inner], j[inner]
+    change = velocity[j] - velocity[i]
+    explained = 0.5 * np.einsum("ea,aec->ec", nodes[j] - nodes[i], slopes[:, i] + slopes[:, j])
+    return _ratio(np.linalg.norm(change - explained), np.linalg.norm(change))
+
+
+def _heating(scene: Scene, flow: Flow, strain_rate: Array, time: float) -> float:
+    """max S:ε̇/(ρ c_p) · time [K], in a steady scene over a time 2π/reference rate (a turn of a tool)."""
+    power = CONTRACTION @ (stress(flow.law, strain_rate) * strain_rate)
+    return float(power.max() / (scene.density * HEAT_CAPACITY)) * (time or 2.0 * np.pi / scene.reference_rate)

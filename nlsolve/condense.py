@@ -1,0 +1,67 @@
+"""Many runs -> few rows of a table: the cheapest run within an error, or how many runs there are."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Annotated, Any, ClassVar
+
+import pandas as pd
+from pydantic import Field
+
+from nlsolve.component import Component
+from nlsolve.outcomes import Run, cheapest, is_error, percent
+from nlsolve.status import Status
+
+NO_RUN = "–"
+"""Stands where no run belongs."""
+
+WITHIN, COUNT = "within", "runs"
+"""Columns that come with the cheapest runs, and with counts."""
+
+Record = dict[str, Any]
+
+
+class Cheapest(Component):
+    """argmin cost over the converged runs with error ≤ each of `within`: what an accuracy costs."""
+
+    noun: ClassVar[str] = "cheapest"
+
+    cost: str = Field("seconds", description="column of `runs` to be least")
+    error: str = Field("velocity_error", description="column of `runs` to be small enough")
+    within: tuple[Annotated[float, Field(gt=0)], ...] = Field(
+        (0.01, 0.001), min_length=1, description="largest errors allowed; a row each"
+    )
+
+    def text(self, within: float) -> str:
+        """A threshold for people."""
+        return percent(within) if is_error(self.error) else f"{within:g}"
+
+    def of(self, runs: Sequence[Run], groups: tuple[str, ...]) -> list[Record]:
+        """A record a threshold and group, with the column `within`; of a group that misses it, nothing but its name."""
+        found = []
+        for within in self.within:
+            for key, members in grouped(runs, groups).items():
+                missed = {"status": Status.CONVERGED.word, **dict(zip(groups, key, strict=True))}
+                best = cheapest(members, self.cost, self.error, within)
+                found.append({**(missed if best is None else best), WITHIN: self.text(within)})
+        return found
+
+
+def counted(runs: Sequence[Run], groups: tuple[str, ...]) -> list[Record]:
+    """A record a group, with the column `runs`: how many there are."""
+    return [
+        {**dict(zip(groups, key, strict=True)), COUNT: len(members)} for key, members in grouped(runs, groups).items()
+    ]
+
+
+def grouped(runs: Sequence[Run], groups: tuple[str, ...]) -> dict[tuple[Any, ...], list[Run]]:
+    """The runs by their values of some columns, in order of appearance."""
+    found: dict[tuple[Any, ...], list[Run]] = {}
+    for run in runs:
+        found.setdefault(key_of(groups, run), []).append(run)
+    return found
+
+
+def key_of(names: tuple[str, ...], run: Run) -> tuple[Any, ...]:
+    """A run's values of some columns."""
+    return tuple(NO_RUN if pd.isna(run.get(name)) else run.get(name) for name in names)

@@ -1,0 +1,42 @@
+"""How good are the operators that a study's discretizers make of its clouds? Told before anything is solved."""
+
+from __future__ import annotations
+
+import hashlib
+from typing import Any
+
+import pandas as pd
+
+from nlsolve.columns import DIAGNOSTICS
+from nlsolve.status import SolveError
+from nlsolve.studies import Study
+
+
+def telling(name: str) -> bool:
+    """Is this a parameter of clouds or discretizers?"""
+    return name.split(".")[0] in ("variant", "scene", "discretizer")
+
+
+def diagnose(study: Study) -> pd.DataFrame:
+    """A row an operator of every distinct cloud and discretizer: what tells the case apart, `nodes`, DIAGNOSTICS.
+
+    A cloud or discretizer that refuses leaves a row whose `operator` is the sentence.
+    """
+    seen: set[str] = set()
+    rows: list[dict[str, Any]] = []
+    for case in study.cases:
+        setup = case.setup
+        named = {name: case.parameters[name] for name in case.swept if telling(name)}
+        try:
+            cloud = setup.scene.cloud(setup.law)
+            key = hashlib.sha256(cloud.nodes.tobytes() + setup.discretizer.model_dump_json().encode()).hexdigest()
+            if key in seen:
+                continue
+            seen.add(key)
+            found = setup.discretizer.diagnostics(cloud) or [{"operator": "this discretizer gives no diagnostics"}]
+        except SolveError as error:
+            rows.append({**named, "operator": error.detail})
+        else:
+            rows += [{**named, "nodes": len(cloud.nodes), **row} for row in found]
+    swept = list(dict.fromkeys(name for case in study.cases for name in case.swept if telling(name)))
+    return pd.DataFrame(rows, columns=[*swept, "nodes", *DIAGNOSTICS])

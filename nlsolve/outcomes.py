@@ -1,0 +1,87 @@
+"""What became of a run beyond its status: right, doubted or wrong; and which runs are worth their price.
+
+The one place where results are judged: tables and figures of `runs` ask here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from nlsolve.columns import RUNS
+from nlsolve.status import Status
+
+VARIANT = "variant"
+"""Column of `runs` with the names of the settings a case was made by, where a sweep has named settings."""
+
+OUTCOME = "outcome"
+"""Column that tables derive from the others, see `outcome`."""
+
+RIGHT, DOUBTED, WRONG = "right", "doubted", "wrong"
+
+ACCEPTED = 0.05
+"""Relative error up to which a converged run is right."""
+
+Run = Mapping[str, Any]
+
+
+def outcome(run: Run, accepted: float = ACCEPTED, error: str = "velocity_error") -> str:
+    """error ≤ accepted: "right"; above it without a word of doubt: "wrong", a false success.
+
+    A converged run with a doubt is "doubted" whatever its error; one whose error nobody knows is "converged"; all
+    others are their status.
+    """
+    if run["status"] != Status.CONVERGED.word:
+        return str(run["status"])
+    if doubt(run):
+        return DOUBTED
+    known = number(run.get(error))
+    return Status.CONVERGED.word if np.isnan(known) else RIGHT if known <= accepted else WRONG
+
+
+def doubt(run: Run) -> str:
+    """Why the result is in doubt; empty where the column `doubt` is empty, NaN or absent."""
+    words = run.get("doubt")
+    return words if isinstance(words, str) else ""
+
+
+def cheapest(runs: Iterable[Run], cost: str, error: str, within: float) -> Run | None:
+    """argmin cost over the converged runs with error ≤ within; None when there is none."""
+    fit = [
+        run
+        for run in runs
+        if run["status"] == Status.CONVERGED.word and number(run.get(error)) <= within and number(run.get(cost)) >= 0
+    ]
+    return min(fit, key=lambda run: number(run[cost]), default=None)
+
+
+def telling(runs: pd.DataFrame) -> list[str]:
+    """Parameters that are not the same in all runs, without those that the runs' `variant` settles."""
+    words = {str(name): [str(value) for value in runs[name]] for name in runs if name not in RUNS}
+    differing = [name for name, values in words.items() if len(set(values)) > 1]
+    if VARIANT not in differing:
+        return differing
+    variants = words[VARIANT]
+    return [
+        name
+        for name in differing
+        if name == VARIANT or len(set(zip(variants, words[name], strict=True))) > len(set(variants))
+    ]
+
+
+def is_error(column: str) -> bool:
+    """Whether a column is a relative error, which people read in percent."""
+    return column.endswith(("_error", "_error_inside"))
+
+
+def percent(fraction: float) -> str:
+    """0.01 -> "1 %", but 1e-6 -> "1e-06": what is below a hundredth of a percent is a number."""
+    return f"{100 * fraction:.3g} %" if fraction >= 1e-4 else f"{fraction:.3g}"
+
+
+def number(value: Any) -> float:
+    """A number, or NaN for what is none."""
+    return float(value) if isinstance(value, (int, float, np.number)) else np.nan

@@ -1,0 +1,66 @@
+"""Linear triangles on the cloud's own triangulation: the baseline that meshless forms must beat at equal cost."""
+
+from __future__ import annotations
+
+from typing import Any, Literal
+
+import numpy as np
+import scipy.sparse as sp
+
+from nlsolve import Cloud, Discretizer, Operators
+from nlsolve_collocation.assembly import Gradient
+from nlsolve_collocation.diagnostics import diagnosis
+from nlsolve_collocation.moving_least_squares import MovingLeastSquares
+from nlsolve_collocation.supports import Supports
+from nlsolve_collocation.triangles import Triangles
+
+NEARBY = MovingLeastSquares(degree=1, support=6)
+"""Gives values between points, and gradients at nodes, for measures and figures."""
+
+
+class LinearTriangles(Discretizer):
+    """∇φ of the hat functions, one strain point a triangle, S = −Bᵀ A: linear finite elements (Courant 1943).
+
+    The volumetric term is the mean of div v over patches of two triangles; on every triangle it would lock.
+    """
+
+    kind: Literal["delaunay"] = "delaunay"
+
+    def operators(self, cloud: Cloud, volumetric: bool) -> Operators:
+        """B, S and, when asked for, B_θ, S_θ, in conservative form."""
+        triangles = Triangles.of(cloud)
+        strain = _gradient(triangles).strain(len(cloud.nodes))
+        parts = (cloud, strain, triangles.centroids(), triangles.areas, triangles.node_areas)
+        if not volumetric:
+            return Operators.conservative(*parts)
+        patches = triangles.patches()
+        return Operators.conservative(*parts, patches.dilatation, patches.centres, patches.areas)
+
+    def gradient(self, cloud: Cloud) -> tuple[Any, Any]:
+        """∂/∂x and ∂/∂y at the nodes: means over the triangles around each, by area."""
+        triangles = Triangles.of(cloud)
+        t, n = len(triangles.corners), len(cloud.nodes)
+        around = sp.csr_array(
+            (np.repeat(triangles.areas / 3.0, 3), (triangles.corners.ravel(), np.repeat(np.arange(t), 3))), shape=(n, t)
+        )
+        mean = sp.diags_array(1.0 / triangles.node_areas) @ around
+        dx, dy = _gradient(triangles).matrices(n)
+        return mean @ dx, mean @ dy
+
+    def values(self, sources: np.ndarray, targets: np.ndarray) -> Any:
+        """Sparse (T, N) matrix of values of a linear fit to the neighbours."""
+        return NEARBY.values(sources, targets)
+
+    def diagnostics(self, cloud: Cloud) -> list[dict[str, Any]]:
+        """A row for the strain weights: the triangles themselves."""
+        triangles = Triangles.of(cloud)
+        gradient, centroids = _gradient(triangles), triangles.centroids()
+        radius = np.linalg.norm(cloud.nodes[triangles.corners] - centroids[:, None], axis=2).max(axis=1)
+        supports = Supports(triangles.corners, np.full(len(radius), 3), radius)
+        row = diagnosis(cloud.nodes, centroids, supports, np.stack([gradient.dx, gradient.dy]), 1)
+        return [{"operator": "strain", **row, "grown": 0}]
+
+
+def _gradient(triangles: Triangles) -> Gradient:
+    hats = triangles.hat_gradients / triangles.areas[:, None, None]
+    return Gradient(triangles.corners, hats[..., 0], hats[..., 1])

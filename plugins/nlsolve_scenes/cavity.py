@@ -1,0 +1,58 @@
+"""A square of material under a moving lid."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import numpy as np
+from pydantic import Field
+
+from nlsolve import Cloud, ConstitutiveLaw
+from nlsolve_scenes.rectangle import Rectangle
+
+
+class Cavity(Rectangle):
+    """0 ≤ x, y ≤ L; V = (U(x), 0) on the lid y = L, and 0 on the other walls and in the corners.
+
+    plain :   U = lid_speed, which jumps to zero in the corners (Ghia, Ghia & Shin 1982).
+    smooth :  U = 16 ξ² (1 − ξ)² lid_speed, ξ = x/L: no singularity in the corners (Bourcier & François 1969).
+
+    Nothing flows in or out, so the flow needs a penalty, best with an iterated pressure (`divergence`). Nodes are
+    scattered, for a regular grid carries a pressure that alternates from cell to cell and is stirred up by the corners.
+    With `convection` the Reynolds number is set by the density, Re = ρ lid_speed L/μ; see `reynolds`.
+    """
+
+    kind: Literal["cavity"] = "cavity"
+    side: float = Field(1.0, gt=0, description="L [mm]")
+    lid_speed: float = Field(1.0, gt=0, description="speed of the lid, at its middle [mm/s]")
+    lid: Literal["plain", "smooth"] = Field("plain", description="profile of the lid's speed")
+    nodes: Literal["grid", "scattered"] = Field("scattered", description="on grid lines, or scattered by repulsion")
+    penalty: float | None = Field(1000.0, gt=0, description="λ, in the unit of penalty_unit")
+    divergence: float | None = Field(
+        1e-6, gt=0, description="‖div V‖/‖ε̄‖ to be reached by iterating the pressure; absent: penalty alone"
+    )
+
+    @property
+    def corners(self) -> tuple[tuple[float, float], tuple[float, float]]:
+        """(0, 0) and (L, L)."""
+        return (0.0, 0.0), (self.side, self.side)
+
+    @property
+    def reference_rate(self) -> float:
+        """Lid speed over side."""
+        return self.lid_speed / self.side
+
+    def reynolds(self, law: ConstitutiveLaw) -> float:
+        """ρ lid_speed L/μ, with μ at the reference rate."""
+        viscosity = float(law.viscosity(np.array([self.reference_rate**2]))[0])
+        return self.density * self.lid_speed * self.side / viscosity
+
+    def boundary_velocity(self, cloud: Cloud, law: ConstitutiveLaw, time: float) -> np.ndarray:
+        """The lid's profile on "top", its two corners held like all other walls."""
+        lid = cloud.boundaries["top"]
+        part = cloud.nodes[lid, 0] / self.side
+        profile = np.ones(len(lid)) if self.lid == "plain" else 16.0 * part**2 * (1.0 - part) ** 2
+        profile[(part == 0.0) | (part == 1.0)] = 0.0
+        velocity = np.zeros_like(cloud.nodes)
+        velocity[lid, 0] = self.lid_speed * profile
+        return velocity[cloud.boundary]
