@@ -1,9 +1,10 @@
-"""Orders of convergence of the steady spin, and the orbit against an independent finite element solution.
+"""Orders of convergence of the steady spin, every law, the bearing, and the orbit against independent finite elements.
 
     python benchmarks/accuracy.py
 
 Prints observed orders between clouds whose spacings are all scaled by s, the nodes that small errors of the spin take
-at small n, and for the orbit the largest difference from the reference (tests/reference) off the walls, in parts of the
+at small n, the errors of every law where there is an exact solution, those of torque and force of the journal bearing,
+and for the orbit the largest difference from the reference (tests/reference) off the walls, in parts of the
 tool speed, and the difference in drag.
 """
 
@@ -24,14 +25,18 @@ TOOL_SPEED = 150.0  # mm/s
 
 
 def steady(
-    scene: dict[str, Any], index: float, discretizer: dict[str, Any] | None = None, **sections: Any
+    scene: dict[str, Any],
+    index: float = 1.0,
+    discretizer: dict[str, Any] | None = None,
+    law: dict[str, Any] | None = None,
+    **sections: Any,
 ) -> nlsolve.Results:
     """One steady state by Newton's method."""
     return nlsolve.run(
         {
             "question": "how accurate is this steady state?",
             "scene": {"kind": "stirring-tool", **scene},
-            "law": {"kind": "power-law", "index": index, "regularization": 1e-3},
+            "law": {"kind": "power-law", "index": index, "regularization": 1e-3} if law is None else law,
             "discretizer": discretizer or {"kind": "mls"},
             "solver": {"kind": "newton"},
             **sections,
@@ -77,6 +82,71 @@ def spins() -> None:
         )
 
 
+LAWS = ("power-law", "norton-hoff", "carreau-yasuda", "cross", "herschel-bulkley", "bingham", "sellars-tegart")
+GRADED = {"delaunay": {"resolution": 0.7}, "mls": {"resolution": 0.5, "growth": 0.1}}
+"""Nodes graded to the layer of the flow with which velocity and torque of every law are within 0.5 %."""
+
+
+def couette(kind: str, law: str) -> pd.Series:
+    """The run of the steady spin of a law, with its defaults, on nodes graded to its layer."""
+    scene = {"kind": "couette", "nodes": {"kind": "auto", **GRADED[kind]}}
+    by = {"by": "regularization", "values": [1e3, 1e2, 10.0, 1.0]} if law in ("bingham", "sellars-tegart") else {}
+    return steady(scene, discretizer={"kind": kind}, law={"kind": law}, start=by).runs.iloc[0]
+
+
+def channel(kind: str, index: float, jitter: float) -> pd.Series:
+    """The run of the flow between plates, nodes 0.05 mm apart."""
+    scene = {"kind": "channel", "spacing": 0.05, "jitter": jitter}
+    return steady(scene, index, {"kind": kind}).runs.iloc[0]
+
+
+def laws() -> None:
+    """Print the errors of every law in the spin, and of the power law in the channel."""
+    print("\nspin of every law:            nodes   smallest spacing   velocity error   torque error")
+    for kind in GRADED:
+        for law in LAWS:
+            run = couette(kind, law)
+            print(
+                f"  {kind:10s}{law:17s}{run['nodes']:7d}{run['smallest_spacing']:15.4f} mm"
+                f"{100 * run['velocity_error']:14.3f} %{100 * run['torque_error']:13.3f} %"
+            )
+    print("\nchannel:        n   jitter   nodes   velocity error")
+    for kind in GRADED:
+        for index in (1.0, 0.5, 0.3, 0.1324):
+            for jitter in (0.0, 0.2):
+                run = channel(kind, index, jitter)
+                print(f"  {kind:8s}{index:8g}{jitter:8.1f}{run['nodes']:9d}{100 * run['velocity_error']:14.4f} %")
+
+
+BEARING: dict[str, dict[str, Any]] = {
+    "delaunay": {"kind": "delaunay"},
+    "mls": {"kind": "mls"},
+    "mls, conservative": {"kind": "mls", "form": "conservative"},
+}
+FEW = {"delaunay": 0.047, "mls": 0.07, "mls, conservative": 0.085}
+"""Spacings [mm] with which torque and force of the bearing are within 0.2 %."""
+
+
+def bearing(name: str, spacing: float) -> pd.Series:
+    """The run of the journal bearing, incompressible by an iterated pressure."""
+    scene = {"kind": "eccentric-cylinders", "spacing": spacing, "penalty": 1e3, "divergence": 1e-8}
+    return steady(scene, 1.0, BEARING[name], stop={"tolerance": 1e-10}).runs.iloc[0]
+
+
+def bearings() -> None:
+    """Print the errors of velocity, torque and force."""
+    print("\nbearing:           spacing   nodes   velocity error   torque error   force error   pressures   seconds")
+    for name in BEARING:
+        for spacing in (0.2, 0.1, FEW[name]):
+            run = bearing(name, spacing)
+            errors = (f"{100 * run[column]:.3f} %" for column in ("velocity_error", "torque_error", "force_error"))
+            print(
+                f"  {name:18s}{spacing:6g}{run['nodes']:8d}"
+                + "".join(f"{error:>15s}" for error in errors)
+                + f"{run['pressure_iterations']:10.0f}{run['seconds_all']:11.1f}"
+            )
+
+
 @dataclass(frozen=True)
 class Comparison:
     """Differences of velocity off the walls, in parts of the tool speed, and the drag [N/mm]."""
@@ -114,4 +184,6 @@ def orbit() -> None:
 if __name__ == "__main__":
     orders()
     spins()
+    laws()
+    bearings()
     orbit()

@@ -30,7 +30,7 @@ except ImportError:
 
 KINDS = ("mls", "rbf", "delaunay")
 PAPER = {"kind": "rings"}
-SCALES = (1.3, 0.7, 0.4, 0.25, 0.17)  # of all spacings: 2 000 to 100 000 nodes
+SCALES = (1.05, 0.6, 0.35, 0.22, 0.143)  # of all spacings: 2 000 to 100 000 nodes
 
 
 def setup(kind: str, nodes: dict[str, Any], **fields: Any) -> Any:

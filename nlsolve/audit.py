@@ -45,6 +45,7 @@ LIMITS: dict[str, Limit] = {
     "audit.convection": Limit(0.05, "convection is not negligible: set convection = true"),
     "audit.compressibility": Limit(0.05, "the material is compressed: raise the penalty, or ask for a divergence"),
     "audit.regularization_strain": Limit(0.02, "the regularization rules much of the flow: lower law.regularization"),
+    "audit.residual": Limit(1e-5, "the residual is not small beside the stresses: tighten stop.tolerance"),
     "audit.resolution": Limit(1 / 3, "the nodes are too far apart for the layers: choose a finer spacing there"),
     "audit.heating": Limit(50.0, "temperature is constant here: the material would heat up and soften", doubt=False),
 }
@@ -69,6 +70,7 @@ def audit(
         **_accelerations(scene, flow, velocity, change, slopes, _stress_slopes(flow, strain_rate, gradient, to_nodes)),
         "audit.compressibility": _compressibility(flow, velocity, slopes),
         **_regularization(flow, strain_rate),
+        "audit.residual": _residual(flow, velocity),
         "audit.resolution": _resolution(flow, velocity, slopes),
         "audit.heating": _heating(scene, flow, strain_rate, time),
     }
@@ -111,6 +113,15 @@ def _compressibility(flow: Flow, velocity: Array, slopes: Array) -> float:
     (exx, vx), (uy, eyy) = slopes[:, flow.cloud.interior].transpose(0, 2, 1)
     rate = np.sqrt(rate_squared(np.stack([exx, eyy, 0.5 * (uy + vx)])))
     return _ratio(np.linalg.norm(exx + eyy), np.linalg.norm(rate))
+
+
+def _residual(flow: Flow, velocity: Array) -> float:
+    """‖R‖₂ / ‖|S| |s|‖₂. A stopping test is relative to all forces that cancel; where a large λ makes those of the
+    penalty by far the largest, it can be met while the stresses are not yet in balance.
+    """
+    u = flow.unknowns(velocity)
+    forces = abs(flow.operators.force) @ np.abs(flow.stress_at_points(u)).ravel()
+    return _ratio(np.linalg.norm(flow.residual(u)), np.linalg.norm(forces))
 
 
 def _regularization(flow: Flow, strain_rate: Array) -> dict[str, float]:

@@ -52,6 +52,7 @@ RUNS: dict[str, str] = {
     "audit.regularization": "share of the strain points with ε̄ < 10 ε₀, for a law with a regularization",
     "audit.regularization_stress": "share of Σ |S| that these strain points carry",
     "audit.regularization_strain": "share of Σ ε̄ that they carry; about three times this is the error inside it makes",
+    "audit.residual": "‖R‖ over the size of the stresses' forces that cancel in it",
     "audit.resolution": "share of the change of V between neighbouring inner nodes that its gradients do not explain",
     "audit.heating": "largest adiabatic heating S:ε̇/(ρ c_p) over the time reached, or a time 2π/reference rate [K]",
     "doubt": "what the audits put in doubt, and the way out; empty when nothing",
@@ -82,7 +83,8 @@ STEPS: dict[str, str] = {
     "difference": "relative difference from the step before, in the norm of the stopping test",
     "range": "a_max of the last series computed for the step",
     "length": "step length of the line search, or the part of the path a series advanced",
-    "contraction": "residual norm over that of the step before, as reported to the refresh rule",
+    "contraction": "residual norm over that of the step before, as reported to the refresh rule: of newton-krylov per inner "
+    "iteration, of scipy-root per value of R",
     "seconds": "time inside the method so far in the march [s]",
     "probe_x": "place of the probe node, x [mm] (accepted steps)",
     "probe_y": "the same, y [mm]",

@@ -35,7 +35,8 @@ def diagnose(study: Study) -> pd.DataFrame:
             seen.add(key)
             found = setup.discretizer.diagnostics(cloud) or [{"operator": "this discretizer gives no diagnostics"}]
         except SolveError as error:
-            rows.append({**named, "operator": error.detail})
+            refused = {**named, "operator": error.detail}
+            rows += [refused] if refused not in rows else []
         else:
             rows += [{**named, "nodes": len(cloud.nodes), **row} for row in found]
     swept = list(dict.fromkeys(name for case in study.cases for name in case.swept if telling(name)))

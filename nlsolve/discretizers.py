@@ -34,6 +34,7 @@ class Operators:
 
     dilatation, pressure_force, volume_points : None when no volumetric term was asked for.
     node_areas, strain_areas, volume_areas : W (F,), A (M,) and A_θ (L,) [mm²] of a conservative form, else None.
+    neighbours : what the discretizer found on the cloud and may keep while nodes move; nobody else looks at it.
     """
 
     strain: Any
@@ -45,6 +46,7 @@ class Operators:
     node_areas: Array | None = None
     strain_areas: Array | None = None
     volume_areas: Array | None = None
+    neighbours: Any = None
 
     @classmethod
     def conservative(
@@ -86,6 +88,12 @@ class Discretizer(Component, ABC):
     @abstractmethod
     def operators(self, cloud: Cloud, volumetric: bool) -> Operators:
         """B, S and, when `volumetric`, B_θ, S_θ. Raises SolveError (bad cloud) naming the place where supports fail."""
+
+    def moved(self, operators: Operators, cloud: Cloud) -> Operators | None:
+        """The operators of a cloud whose nodes have moved a little, with the `neighbours` found before; None when they
+        serve no more. Asked only of operators that carry some; a class that overrides `operators` overrides both.
+        """
+        return None
 
     @abstractmethod
     def gradient(self, cloud: Cloud) -> tuple[Any, Any]:

@@ -13,7 +13,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from nlsolve.discretizers import Operators
-from nlsolve.laws import ConstitutiveLaw, Number, stress, tangent_moduli
+from nlsolve.laws import ConstitutiveLaw, Number, rate_squared, stress, tangent_moduli
 from nlsolve.problems import Expansion, NonlinearProblem
 from nlsolve.scenes import Cloud
 from nlsolve.series import Array, Series
@@ -116,7 +116,16 @@ class Flow(NonlinearProblem):
 
     def jacobian(self, u: Array) -> Any:
         """J = W ρ (1/Δt + ∂(v·∇ v)/∂v) − S C B − S_θ λ B_θ with the pointwise moduli C (3, 3, M) of the law."""
-        moduli = tangent_moduli(self.law, self._strain_rate(u))
+        carried = None if self._carried is None else self._carried.tangent(u)
+        return self._linearized(tangent_moduli(self.law, self._strain_rate(u)), carried)
+
+    def secant(self, u: Array) -> Any:
+        """A = W ρ (1/Δt + v·∇) − S 2μ B − S_θ λ B_θ, viscosity and carrying velocity those of u (Picard, Oseen)."""
+        carried = None if self._carried is None else self._carried.secant(u)
+        return self._linearized(secant_moduli(self.law, self._strain_rate(u)), carried)
+
+    def _linearized(self, moduli: Array, carried: Any) -> Any:
+        """W ρ/Δt + carried − S C B − S_θ λ B_θ with pointwise moduli C (3, 3, M)."""
         points = moduli.shape[2]
         # C as a sparse matrix with three entries a row: row a M + m holds columns m, M + m, 2 M + m.
         columns = np.arange(points)[None, :, None] + points * np.arange(3)[None, None, :]
@@ -133,9 +142,7 @@ class Flow(NonlinearProblem):
             jacobian = jacobian + self._gradient @ self._dilatation
         if self._inertia is not None:
             jacobian = jacobian + sp.diags_array(self._inertia)
-        if self._carried is not None:
-            jacobian = jacobian + self._carried.tangent(u)
-        return jacobian
+        return jacobian if carried is None else jacobian + carried
 
     def scale(self, u: Array) -> float:
         """‖|S| |s| + |S_θ λ| |B_θ v| + W ρ |v/Δt + v·∇ v| + |constant|‖₂: the size of the forces that cancel in R."""
@@ -191,11 +198,18 @@ class _Carried:
         (x, x_0, speed_x), (y, y_0, speed_y) = self._terms
         return (speed_x @ u) * (x @ u + x_0) + (speed_y @ u) * (y @ u + y_0)
 
+    def secant(self, u: Array) -> Any:
+        return sum(sp.diags_array(speed @ u) @ slope for slope, _, speed in self._terms)
+
     def tangent(self, u: Array) -> Any:
-        return sum(
-            sp.diags_array(slope @ u + slope_0) @ speed + sp.diags_array(speed @ u) @ slope
-            for slope, slope_0, speed in self._terms
+        return self.secant(u) + sum(
+            sp.diags_array(slope @ u + slope_0) @ speed for slope, slope_0, speed in self._terms
         )
+
+
+def secant_moduli(law: ConstitutiveLaw, strain_rate: Array) -> Array:
+    """C = 2 μ I, shape (3, 3, M), so that s = C ε̇."""
+    return 2.0 * np.eye(3)[:, :, None] * law.viscosity(rate_squared(strain_rate))
 
 
 def node_major(nodes: Any) -> Any:

@@ -9,13 +9,14 @@ from __future__ import annotations
 
 import time
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any
 from weakref import WeakKeyDictionary
 
 import numpy as np
+import scipy.sparse as sp
 
 from nlsolve.linear import Factors, LinearSolver
 from nlsolve.problems import Expansion, NonlinearProblem
@@ -47,13 +48,23 @@ class Ledger:
 
 
 class SealedMatrix:
-    """A Jacobian as a method sees it: a shape, and products that are counted."""
+    """A Jacobian as a method sees it: a shape, products that are counted, a heavier diagonal."""
 
     def __init__(self, shape: tuple[int, int]) -> None:
         self.shape = shape
 
     def __matmul__(self, vector: Array) -> Array:
         return _contents[self](vector)
+
+    def transposed_product(self, vector: Array) -> Array:
+        """Aᵀ vector, counted as a product."""
+        return _contents[self](vector, transposed=True)
+
+    def damped(self, shift: float) -> SealedMatrix:
+        """A + shift · diag(|A_ii|), sealed like A."""
+        contents = _contents[self]
+        heavier = sp.diags_array(shift * np.abs(contents.matrix.diagonal()))
+        return _seal(contents.matrix + heavier, contents.ledger)
 
 
 class _Contents:
@@ -62,12 +73,18 @@ class _Contents:
     def __init__(self, matrix: Any, ledger: Ledger) -> None:
         self.matrix, self.ledger = matrix, ledger
 
-    def __call__(self, vector: Array) -> Array:
+    def __call__(self, vector: Array, transposed: bool = False) -> Array:
         with self.ledger.entry("matrix_product"):
-            return self.matrix @ vector
+            return (self.matrix.T if transposed else self.matrix) @ vector
 
 
 _contents: WeakKeyDictionary[SealedMatrix, _Contents] = WeakKeyDictionary()
+
+
+def _seal(matrix: Any, ledger: Ledger) -> SealedMatrix:
+    sealed = SealedMatrix(matrix.shape)
+    _contents[sealed] = _Contents(matrix, ledger)
+    return sealed
 
 
 def factorize_counted(linear: LinearSolver, sealed: SealedMatrix, previous: Factors | None, ledger: Ledger) -> Factors:
@@ -138,6 +155,11 @@ def _view(problem: NonlinearProblem, ledger: Ledger, remember: Any) -> Nonlinear
         def path(self, a: float) -> Array:
             return self._sum(a)
 
+    def assembled(assemble: Callable[[Array], Any], u: Array) -> SealedMatrix:
+        with ledger.entry("jacobian"):
+            matrix = assemble(u)
+        return _seal(matrix, ledger)
+
     class CountedProblem(NonlinearProblem):
         def residual(self, u: Array) -> Array:
             with ledger.entry("residual"):
@@ -146,11 +168,10 @@ def _view(problem: NonlinearProblem, ledger: Ledger, remember: Any) -> Nonlinear
             return residual
 
         def jacobian(self, u: Array) -> SealedMatrix:
-            with ledger.entry("jacobian"):
-                matrix = problem.jacobian(u)
-            sealed = SealedMatrix(matrix.shape)
-            _contents[sealed] = _Contents(matrix, ledger)
-            return sealed
+            return assembled(problem.jacobian, u)
+
+        def secant(self, u: Array) -> SealedMatrix:
+            return assembled(problem.secant, u)  # assembled like a Jacobian, and counted as one
 
         def expand(self, u: Array) -> Expansion:
             with ledger.entry("residual"):

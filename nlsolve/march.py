@@ -219,7 +219,10 @@ class _March:
     def build_operators(self) -> None:
         before = self.operators.volume_points if self.pressure is not None else None
         with self.ledger.entry("operators"):
-            self.operators = self.setup.discretizer.operators(self.cloud, self.volumetric)
+            if self.moving is None:
+                self.operators = self.setup.discretizer.operators(self.cloud, self.volumetric)
+            else:
+                self.operators = self.moving.operators(self.cloud, self.volumetric)
             self.gradient = self.setup.discretizer.gradient(self.cloud) if self.scene.convection else None
         if before is not None:
             assert self.operators.volume_points is not None
@@ -265,7 +268,7 @@ class _March:
             return outcome
         detail = (
             f"‖div V‖/‖ε̄‖ = {reached:.1e} after {most} iterations of the pressure, {asked:g} was asked for: "
-            "raise the penalty, or tighten stop.tolerance"
+            "raise the penalty, tighten stop.tolerance, or take the dilatation in another form"
         )
         return replace(outcome, status=Status.BUDGET_SPENT, detail=detail)
 

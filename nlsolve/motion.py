@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from scipy.spatial import cKDTree
 
-from nlsolve.discretizers import Discretizer
+from nlsolve.discretizers import Discretizer, Operators
 from nlsolve.scenes import Cloud, Scene
 from nlsolve.series import Array
 from nlsolve.status import SolveError, Status
@@ -99,10 +99,24 @@ def within(nodes: Array, places: Array) -> Array:
     return np.clip(places, nodes.min(axis=0), nodes.max(axis=0))
 
 
+class Neighbourhoods:
+    """Which nodes j of a cloud are the nearest to each node i, and the distances between them."""
+
+    def __init__(self, cloud: Cloud) -> None:
+        distance, near = cKDTree(cloud.nodes).query(cloud.nodes, min(NEIGHBOURS + 1, len(cloud.nodes)))
+        self.distance, self.near = distance[:, 1:], near[:, 1:]
+
+    def parted(self, nodes: Array) -> float:
+        """max_ij | |x_i − x_j| − d_ij | / min_j d_ij of nodes (N, 2) that were d_ij apart: 0 for a rigid motion."""
+        distance = np.linalg.norm(nodes[:, None] - nodes[self.near], axis=2)
+        return float((np.abs(distance - self.distance) / self.distance[:, :1]).max())
+
+
 class MovingNodes:
-    """Nodes that move with the material, and how evenly spaced they stay.
+    """Nodes that move with the material, how evenly spaced they stay, and whose neighbours they are.
 
     quality : smallest distance to the nearest node over that of the same node at t = 0, so far.
+    searches : how often neighbours were found, so far.
 
     Shifted nodes are not material points any more; markers are.
     """
@@ -110,6 +124,24 @@ class MovingNodes:
     def __init__(self, scene: Scene, discretizer: Discretizer, initial: Cloud) -> None:
         self.scene, self.discretizer, self.initial = scene, discretizer, initial
         self.quality = 1.0
+        self.searches = 0
+        self._operators: Operators
+        self._found: Neighbourhoods | None = None
+
+    def operators(self, cloud: Cloud, volumetric: bool) -> Operators:
+        """Of the moved cloud, with the neighbours found last while none has parted by more than the scene's `skin`
+        (lists of Verlet 1967) and while the discretizer can keep them.
+        """
+        operators = None
+        if self._found is not None and self._found.parted(cloud.nodes) <= self.scene.skin:
+            operators = self.discretizer.moved(self._operators, cloud)
+        if operators is None:
+            operators = self.discretizer.operators(cloud, volumetric)
+            keeps = self.scene.skin and operators.neighbours is not None
+            self._found = Neighbourhoods(cloud) if keeps else None
+            self.searches += 1
+        self._operators = operators
+        return operators
 
     def move(self, cloud: Cloud, velocity: Array, before: Array | None, time: float) -> tuple[Cloud, Any]:
         """x_{k+1} = x_k + Δt (3/2 v_k − 1/2 v_{k−1}) (Adams-Bashforth), then shifted if the scene asks for it.
@@ -150,8 +182,8 @@ def shifts(cloud: Cloud, spacing: Array, fraction: float) -> Array:
     t = 0 push each other away, others stay. Repulsion of Persson & Strang (2004), used as particle shifting (Lind, Xu,
     Stansby & Rogers 2012).
     """
-    distance, near = cKDTree(cloud.nodes).query(cloud.nodes, min(NEIGHBOURS + 1, len(cloud.nodes)))
-    distance, near = distance[:, 1:], near[:, 1:]
+    found = Neighbourhoods(cloud)
+    distance, near = found.distance, found.near
     push = np.maximum(0.5 * (spacing[:, None] + spacing[near]) - distance, 0.0) / distance
     shift = fraction * (push[..., None] * (cloud.nodes[:, None] - cloud.nodes[near])).sum(axis=1)
     shift[cloud.boundary] = 0.0

@@ -6,6 +6,7 @@ from abc import ABC, abstractmethod
 from typing import Any
 
 from nlsolve.series import Array, Series
+from nlsolve.status import SolveError, Status
 
 
 class Expansion:
@@ -47,6 +48,17 @@ class NonlinearProblem(ABC):
     @abstractmethod
     def expand(self, u: Array) -> Expansion:
         """The expansion of R around u."""
+
+    def secant(self, u: Array) -> Any:
+        """A(u) with R(u) = A(u) u + c(u), a sparse (U, U) matrix, of a problem that is linear but for its coefficients.
+
+        These stay out of A's own derivative: Picard's matrix. SolveError (not applicable) from a problem without one.
+        """
+        raise SolveError(
+            Status.NOT_APPLICABLE,
+            f"{type(self).__name__} has no secant matrix A(u) with R(u) = A(u) u + c(u): choose a method that needs "
+            "its Jacobian only, such as newton or anderson",
+        )
 
     def scale(self, u: Array) -> float:
         """What ‖R‖₂ is compared with to call it small; 1 unless the problem knows the size of what cancels in R."""

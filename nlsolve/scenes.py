@@ -115,6 +115,13 @@ class Scene(Component, ABC):
     shifting: float = Field(
         0.0, ge=0, le=1, description="moving nodes: part of the overlap by which near ones part in an increment"
     )
+    skin: float = Field(
+        0.0,
+        ge=0,
+        le=1,
+        description="moving nodes: neighbours and triangles are kept until the distance of two near nodes has changed "
+        "by this part of the nearest one's; 0: found anew in each increment",
+    )
     probe: tuple[float, float] | None = Field(None, description="place whose nearest node is recorded in time [mm]")
 
     @model_validator(mode="after")
@@ -134,6 +141,11 @@ class Scene(Component, ABC):
         if self.shifting and self.motion_of_nodes == "fixed":
             raise ValueError(
                 f'shifting = {self.shifting:g}: fixed nodes are not shifted; use motion_of_nodes = "lagrangian"'
+            )
+        if self.skin and self.motion_of_nodes == "fixed":
+            raise ValueError(
+                f"skin = {self.skin:g}: the neighbours of fixed nodes never change; "
+                'use motion_of_nodes = "lagrangian" or leave it out'
             )
         return self
 

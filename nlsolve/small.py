@@ -46,6 +46,11 @@ class SmallProblem(NonlinearProblem):
         DenseLU.asked["jacobian"] += 1
         return (self.matrix + sp.diags_array(np.cosh(u))).tocsr()
 
+    def secant(self, u: Array) -> Any:
+        DenseLU.asked["jacobian"] += 1
+        ratio = np.divide(np.sinh(u), u, out=np.ones_like(u), where=u != 0.0)
+        return (self.matrix + sp.diags_array(ratio)).tocsr()
+
     def expand(self, u: Array) -> Expansion:
         path = Series(u)
         return Expansion(path, self.residual(path))

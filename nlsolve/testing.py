@@ -94,8 +94,12 @@ def check_discretizer(discretizer: Discretizer, cloud: Cloud, tolerance: float =
     _require(full.dilatation is not None and full.volume_points is not None, "no volumetric operators")
     assert full.volume_points is not None
     m, count, f = len(full.strain_points), len(full.volume_points), len(free)
-    shapes = {"strain": (3 * m, 2 * n), "force": (2 * f, 3 * m), "strain_points": (m, 2)}
-    volumetric = {"dilatation": (count, 2 * n), "pressure_force": (2 * f, count), "volume_points": (count, 2)}
+    shapes: dict[str, tuple[int, ...]] = {"strain": (3 * m, 2 * n), "force": (2 * f, 3 * m), "strain_points": (m, 2)}
+    volumetric: dict[str, tuple[int, ...]] = {
+        "dilatation": (count, 2 * n),
+        "pressure_force": (2 * f, count),
+        "volume_points": (count, 2),
+    }
     conservative = full.node_areas is not None
     if conservative:
         shapes |= {"node_areas": (f,), "strain_areas": (m,)}
@@ -137,9 +141,9 @@ def check_discretizer(discretizer: Discretizer, cloud: Cloud, tolerance: float =
 
 def _check_adjoint(operators: Operators, free: Array) -> None:
     """S + Bᵀ A = 0 and S_θ + B_θᵀ A_θ = 0 on the unknowns; no area is negative, and nodes have some."""
-    assert (
-        operators.strain_areas is not None and operators.volume_areas is not None and operators.node_areas is not None
-    )
+    assert operators.strain_areas is not None
+    assert operators.volume_areas is not None
+    assert operators.node_areas is not None
     weighed = np.outer(CONTRACTION, operators.strain_areas).ravel()
     for name, force, rate, areas in (
         ("S = −Bᵀ A", operators.force, operators.strain, weighed),

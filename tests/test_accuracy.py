@@ -69,6 +69,52 @@ class TestSteadySpinOnNodesGradedToItsLayer:
         assert run["doubt"] == ""
 
 
+class TestEveryLaw:
+    """Defaults of every law on nodes graded to its layer: velocity and torque within 0.5 %."""
+
+    bound = 0.005
+    nodes = {"delaunay": 5000, "mls": 9000}  # noqa: RUF012
+
+    @pytest.mark.parametrize(
+        ("discretizer", "law"),
+        [
+            pytest.param(kind, law, marks=pytest.mark.slow if kind == "mls" else ())
+            for kind in accuracy.GRADED
+            for law in accuracy.LAWS
+        ],
+    )
+    def test_spin(self, discretizer: str, law: str) -> None:
+        run = accuracy.couette(discretizer, law)
+        assert run["nodes"] <= self.nodes[discretizer]
+        assert run["velocity_error"] <= self.bound
+        assert run["torque_error"] <= self.bound
+
+    @pytest.mark.parametrize("index", [1.0, 0.5, 0.3, 0.1324])
+    def test_channel(self, index: float) -> None:
+        assert accuracy.channel("delaunay", index, jitter=0.2)["velocity_error"] <= self.bound
+
+
+class TestBearing:
+    """Torque and force within 0.2 % of Jeffery's closed form."""
+
+    bound = 2e-3
+
+    @pytest.mark.parametrize(
+        ("name", "nodes"),
+        [
+            ("mls, conservative", 4000),
+            pytest.param("mls", 6000, marks=pytest.mark.slow),
+            pytest.param("delaunay", 12000, marks=pytest.mark.slow),
+        ],
+    )
+    def test_torque_and_force(self, name: str, nodes: int) -> None:
+        run = accuracy.bearing(name, accuracy.FEW[name])
+        assert run["nodes"] <= nodes
+        assert run["divergence"] <= 1e-8
+        assert run["torque_error"] <= self.bound
+        assert run["force_error"] <= self.bound
+
+
 class TestOrbitAgainstIndependentFiniteElements:
     """λ/μ = 1e4, at most 6500 nodes: velocity within 0.5 % of the tool speed off the walls, drag within 0.5 %."""
 

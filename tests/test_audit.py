@@ -17,6 +17,7 @@ from nlsolve import Cloud, ConstitutiveLaw, SolveError, Status
 from nlsolve.audit import HEAT_CAPACITY, LIMITS, audit
 from nlsolve.cli import left_out
 from nlsolve.columns import RUNS
+from nlsolve.driver import StoppingTest
 from nlsolve.flow import Flow
 from nlsolve.march import march
 
@@ -211,3 +212,16 @@ def test_the_command_line_tells_the_worst_values_and_what_to_do() -> None:
         LIMITS["audit.resolution"].sentence,
     ]
     assert left_out(runs.assign(**{name: np.nan for name in LIMITS})) == []
+
+
+def test_a_residual_small_only_beside_a_huge_penalty_is_in_doubt() -> None:
+    """λ/μ = 1e8 makes 1e-8 of all forces 1e-3 of the stresses: the test is met before these are in balance."""
+    graded = GradedRings(first=0.08, growth=0.15, spacing=0.4)
+    loose, tight = (
+        summary(spin(nodes=graded, penalty=penalty), 0.3, stop=StoppingTest(tolerance=1e-8)) for penalty in (1e8, 1e2)
+    )
+    assert loose["status"] == tight["status"] == "converged"
+    assert loose["velocity_error_inside"] > 2.0 * tight["velocity_error_inside"]
+    assert loose["audit.residual"] > LIMITS["audit.residual"].largest > 100 * tight["audit.residual"]
+    assert "tighten stop.tolerance" in loose["doubt"]
+    assert tight["doubt"] == ""

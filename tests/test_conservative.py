@@ -254,3 +254,11 @@ def test_a_node_that_no_point_feels_cannot_be_balanced() -> None:
     with pytest.raises(SolveError, match="cannot be made conservative on this cloud: widen the supports") as ending:
         conserving(cloud, points, areas, gradient)
     assert ending.value.status is Status.BAD_CLOUD
+
+
+def test_supports_that_leave_no_freedom_to_conserve_are_refused() -> None:
+    """Three neighbours for a linear polynomial determine their gradient: only rounding could balance it."""
+    discretizer = MovingLeastSquares(form="conservative", degree=1, support=3, balanced=False)
+    with pytest.raises(SolveError, match=r"the supports of 3 neighbours .*widen discretizer.support") as refused:
+        discretizer.operators(CLOUDS["rings"], False)
+    assert refused.value.status is Status.ILL_CONDITIONED

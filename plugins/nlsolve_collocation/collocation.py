@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import Any, ClassVar, Literal
 
 import numpy as np
@@ -14,6 +15,7 @@ from nlsolve_collocation.assembly import Gradient, sparse_rows
 from nlsolve_collocation.conservation import conserving
 from nlsolve_collocation.diagnostics import diagnosis
 from nlsolve_collocation.least_squares import Derivatives, monomials
+from nlsolve_collocation.neighbours import Neighbours
 from nlsolve_collocation.supports import Supports
 from nlsolve_collocation.triangles import Triangles
 
@@ -62,13 +64,19 @@ class Collocation(Discretizer):
         """What is wrong with the worst support, of `count` neighbours around `place`; None when it will do."""
 
     def weights(
-        self, sources: np.ndarray, targets: np.ndarray, role: str, derivatives: Derivatives, cloud: Cloud | None = None
+        self,
+        sources: np.ndarray,
+        targets: np.ndarray,
+        role: str,
+        derivatives: Derivatives,
+        cloud: Cloud | None = None,
+        kept: Supports | None = None,
     ) -> tuple[Supports, np.ndarray]:
-        """Supports and weights (D, T, k) for `derivatives`; weak supports are enlarged.
+        """Supports and weights (D, T, k) for `derivatives`; supports are found unless `kept`, weak ones are enlarged.
 
         Raises SolveError naming the place of a support that stays weak.
         """
-        supports = self.supports(sources, targets, role, cloud)
+        supports = self.supports(sources, targets, role, cloud) if kept is None else kept.moved(sources, targets)
         quality = np.empty(len(targets))
         found = np.zeros((len(derivatives), *supports.index.shape))
         renew = np.arange(len(targets))
@@ -93,26 +101,37 @@ class Collocation(Discretizer):
 
     def operators(self, cloud: Cloud, volumetric: bool) -> Operators:
         """B, S and, when asked for, B_θ, S_θ."""
-        triangles = Triangles.of(cloud)
-        if self.form == "conservative":
-            return self._conservative(cloud, triangles, volumetric)
+        return self._operators(Neighbours(Triangles.of(cloud)), volumetric)
+
+    def moved(self, operators: Operators, cloud: Cloud) -> Operators | None:
+        """With the same triangles, patches and supports, unless a triangle is turned inside out."""
+        near = operators.neighbours.moved_to(cloud)
+        return self._operators(near, operators.dilatation is not None) if near.triangles.upright else None
+
+    def _operators(self, near: Neighbours, volumetric: bool) -> Operators:
+        build = self._conservative if self.form == "conservative" else self._strong
+        return replace(build(near, volumetric), neighbours=near)
+
+    def _strong(self, near: Neighbours, volumetric: bool) -> Operators:
+        triangles, cloud = near.triangles, near.triangles.cloud
         nodes, interior = cloud.nodes, cloud.interior
         points = triangles.midpoints() if self.points == "between" else nodes
-        strain = self._gradient(nodes, points, "strain", cloud).strain(len(nodes))
-        force = self._gradient(points, nodes[interior], "force", cloud).divergence_of_stress(len(points))
+        strain = self._gradient(nodes, points, "strain", cloud, near.supports).strain(len(nodes))
+        force = self._gradient(points, nodes[interior], "force", cloud, near.supports).divergence_of_stress(len(points))
         if not volumetric:
             return Operators(strain, force, points)
         if self.volume_points == "pairs":
             patches = triangles.patches()
             return Operators(strain, force, points, patches.dilatation, patches.force_per_area(), patches.centres)
-        gradient = self._gradient(nodes, nodes, "volume", cloud)
+        gradient = self._gradient(nodes, nodes, "volume", cloud, near.supports)
         dilatation = gradient.divergence(len(nodes))
         return Operators(strain, force, points, dilatation, gradient.at(interior).of_pressure(len(nodes)), nodes)
 
-    def _conservative(self, cloud: Cloud, triangles: Triangles, volumetric: bool) -> Operators:
+    def _conservative(self, near: Neighbours, volumetric: bool) -> Operators:
+        triangles, cloud = near.triangles, near.triangles.cloud
         nodes = cloud.nodes
         points, areas = triangles.diamonds() if self.points == "between" else (nodes, triangles.node_areas)
-        gradient = conserving(cloud, points, areas, self._gradient(nodes, points, "strain", cloud))
+        gradient = conserving(cloud, points, areas, self._gradient(nodes, points, "strain", cloud, near.supports))
         strain = gradient.strain(len(nodes))
         if not volumetric:
             return Operators.conservative(cloud, strain, points, areas, triangles.node_areas)
@@ -120,7 +139,9 @@ class Collocation(Discretizer):
             patches = triangles.patches()
             volume = (patches.dilatation, patches.centres, patches.areas)
         else:
-            gradient = conserving(cloud, nodes, triangles.node_areas, self._gradient(nodes, nodes, "volume", cloud))
+            gradient = conserving(
+                cloud, nodes, triangles.node_areas, self._gradient(nodes, nodes, "volume", cloud, near.supports)
+            )
             volume = (gradient.divergence(len(nodes)), nodes, triangles.node_areas)
         return Operators.conservative(cloud, strain, points, areas, triangles.node_areas, *volume)
 
@@ -149,9 +170,18 @@ class Collocation(Discretizer):
             rows.append({"operator": role, **row, "grown": int((supports.count > plain.count).sum())})
         return rows
 
-    def _gradient(self, sources: np.ndarray, targets: np.ndarray, role: str, cloud: Cloud) -> Gradient:
-        supports, (dx, dy) = self.weights(sources, targets, role, GRADIENT, cloud)
-        return Gradient(supports.index, dx, dy)
+    def _gradient(
+        self,
+        sources: np.ndarray,
+        targets: np.ndarray,
+        role: str,
+        cloud: Cloud,
+        found: dict[str, Supports] | None = None,
+    ) -> Gradient:
+        """Supports are taken from those `found` before, and put there."""
+        found = {} if found is None else found
+        found[role], (dx, dy) = self.weights(sources, targets, role, GRADIENT, cloud, found.get(role))
+        return Gradient(found[role].index, dx, dy)
 
 
 def _batches(counts: np.ndarray, targets: np.ndarray) -> Iterator[tuple[int, np.ndarray]]:

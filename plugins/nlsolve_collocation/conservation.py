@@ -20,11 +20,15 @@ from nlsolve_collocation.least_squares import weight_function
 NEARNESS = 4.0
 """Shape of the weights w: changes fall on the nearest nodes, where they cost least accuracy (measured: 3.5 to 5)."""
 
+LARGEST_CORRECTION = 2.0
+"""Of the gradients, relative to them. Usual supports need 0.04 to 1, supports without freedom 6 to 80."""
+
 
 def conserving(cloud: Cloud, points: np.ndarray, areas: np.ndarray, gradient: Gradient) -> Gradient:
     """The corrected gradient at `points` (M, 2) with `areas` (M,) [mm²].
 
-    Raises SolveError (bad cloud) when some interior node is not felt by enough points to be balanced.
+    Raises SolveError (bad cloud) when some interior node is not felt by enough points to be balanced, and (ill
+    conditioned) when the correction is larger than what it corrects.
     """
     near, n, free = gradient.near, len(cloud.nodes), cloud.interior
     felt = (gradient.dx != 0.0) | (gradient.dy != 0.0)  # not by what only fills up a support
@@ -54,7 +58,19 @@ def conserving(cloud: Cloud, points: np.ndarray, areas: np.ndarray, gradient: Gr
             weights = weights - np.einsum("mkl,ml->mk", change, multiplier[near])
         return weights
 
-    return Gradient(near, balanced(gradient.dx), balanced(gradient.dy))
+    corrected = Gradient(near, balanced(gradient.dx), balanced(gradient.dy))
+    part = _distance(corrected, gradient) / _distance(gradient, Gradient(near, 0.0 * gradient.dx, 0.0 * gradient.dy))
+    if not part <= LARGEST_CORRECTION:
+        raise SolveError(
+            Status.ILL_CONDITIONED,
+            f"gradients that conserve are {part:.0%} away from the accurate ones: the supports of "
+            f"{int(felt.sum(axis=1).min())} neighbours leave them no freedom; widen discretizer.support",
+        )
+    return corrected
+
+
+def _distance(one: Gradient, other: Gradient) -> float:
+    return float(np.hypot(np.linalg.norm(one.dx - other.dx), np.linalg.norm(one.dy - other.dy)))
 
 
 def _projector(offsets: np.ndarray, felt: np.ndarray) -> np.ndarray:

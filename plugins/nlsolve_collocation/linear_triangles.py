@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any, Literal
 
 import numpy as np
@@ -28,13 +29,12 @@ class LinearTriangles(Discretizer):
 
     def operators(self, cloud: Cloud, volumetric: bool) -> Operators:
         """B, S and, when asked for, B_θ, S_θ, in conservative form."""
-        triangles = Triangles.of(cloud)
-        strain = _gradient(triangles).strain(len(cloud.nodes))
-        parts = (cloud, strain, triangles.centroids(), triangles.areas, triangles.node_areas)
-        if not volumetric:
-            return Operators.conservative(*parts)
-        patches = triangles.patches()
-        return Operators.conservative(*parts, patches.dilatation, patches.centres, patches.areas)
+        return _operators(Triangles.of(cloud), volumetric)
+
+    def moved(self, operators: Operators, cloud: Cloud) -> Operators | None:
+        """The same triangles and patches, unless a triangle is turned inside out."""
+        triangles = operators.neighbours.moved_to(cloud)
+        return _operators(triangles, operators.dilatation is not None) if triangles.upright else None
 
     def gradient(self, cloud: Cloud) -> tuple[Any, Any]:
         """∂/∂x and ∂/∂y at the nodes: means over the triangles around each, by area."""
@@ -56,9 +56,20 @@ class LinearTriangles(Discretizer):
         triangles = Triangles.of(cloud)
         gradient, centroids = _gradient(triangles), triangles.centroids()
         radius = np.linalg.norm(cloud.nodes[triangles.corners] - centroids[:, None], axis=2).max(axis=1)
-        supports = Supports(triangles.corners, np.full(len(radius), 3), radius)
+        supports = Supports(triangles.corners, np.full(len(radius), 3), radius, radius)
         row = diagnosis(cloud.nodes, centroids, supports, np.stack([gradient.dx, gradient.dy]), 1)
         return [{"operator": "strain", **row, "grown": 0}]
+
+
+def _operators(triangles: Triangles, volumetric: bool) -> Operators:
+    cloud = triangles.cloud
+    strain = _gradient(triangles).strain(len(cloud.nodes))
+    patches = triangles.patches() if volumetric else None
+    volume = () if patches is None else (patches.dilatation, patches.centres, patches.areas)
+    operators = Operators.conservative(
+        cloud, strain, triangles.centroids(), triangles.areas, triangles.node_areas, *volume
+    )
+    return replace(operators, neighbours=triangles)
 
 
 def _gradient(triangles: Triangles) -> Gradient:

@@ -22,10 +22,14 @@ from nlsolve import Cloud, SolveError, Status
 
 @dataclass(frozen=True)
 class Triangles:
-    """Triangles (T, 3) of a cloud, counter-clockwise, without those that span a hole or lie along a wall."""
+    """Triangles (T, 3) of a cloud, counter-clockwise, without those that span a hole or lie along a wall.
+
+    found : the same triangles on the cloud they were found on, when its nodes have moved since.
+    """
 
     cloud: Cloud
     corners: np.ndarray
+    found: Triangles | None = None
 
     @classmethod
     def of(cls, cloud: Cloud) -> Triangles:
@@ -44,6 +48,15 @@ class Triangles:
             raise SolveError(Status.BAD_CLOUD, "a node belongs to no triangle of the cloud: it coincides with another")
         return triangles
 
+    def moved_to(self, cloud: Cloud) -> Triangles:
+        """The same triangles, edges and patches with the nodes at other places."""
+        return Triangles(cloud, self.corners, self.found or self)
+
+    @property
+    def upright(self) -> bool:
+        """No triangle has been turned inside out by the motion of its nodes."""
+        return bool((self.areas > 0.0).all())
+
     @cached_property
     def areas(self) -> np.ndarray:
         """Area of each triangle [mm²]."""
@@ -53,6 +66,8 @@ class Triangles:
     @cached_property
     def edges(self) -> tuple[np.ndarray, np.ndarray]:
         """Edges (E, 2), each once, smaller node first, and for each the triangles beside it (E, 2), −1 for none."""
+        if self.found is not None:
+            return self.found.edges
         sides = np.sort(self.corners[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
         owner = np.repeat(np.arange(len(self.corners)), 3)
         key = sides[:, 0] * len(self.cloud.nodes) + sides[:, 1]
@@ -69,6 +84,11 @@ class Triangles:
         ends, _ = self.edges
         inner = ~self.cloud.on_boundary[ends].all(axis=1)
         return self.cloud.nodes[ends[inner]].mean(axis=1)
+
+    @cached_property
+    def patch(self) -> np.ndarray:
+        """Number of the patch of each triangle, (T,): its pair where the triangles were found."""
+        return self.pairs() if self.found is None else self.found.patch
 
     def pairs(self) -> np.ndarray:
         """Number of the patch of each triangle, (T,): neighbours merged across their relatively longest common edges.
@@ -134,9 +154,8 @@ class Triangles:
         return self.cloud.nodes[ends].mean(axis=1), areas
 
     def patches(self) -> Patches:
-        """The mean of div v over each patch of `pairs`."""
-        corners, areas = self.corners, self.areas
-        patch = self.pairs()
+        """The mean of div v over each patch."""
+        corners, areas, patch = self.corners, self.areas, self.patch
         count = int(patch.max()) + 1
         columns = 2 * corners[:, :, None] + np.arange(2)
         rows = np.broadcast_to(patch[:, None, None], columns.shape)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Literal
 
+import numpy as np
 from pydantic import Field
 
 from nlsolve import Component, Evidence, RefreshRule, hookimpl
@@ -42,6 +43,29 @@ class PoorContraction(RefreshRule):
         return evidence.contraction is not None and not evidence.contraction <= self.limit
 
 
+class CostOptimal(RefreshRule):
+    """When the iterations left with this K* cost more than a factorisation and those left with a new one:
+
+        d/lg(1/θ) > ratio + d/lg(1/θ_new)          θ: the contraction of the last step
+
+    in units of one iteration, for d decimal digits of residual to be gained yet.
+    """
+
+    kind: Literal["cost-optimal"] = "cost-optimal"
+    ratio: float = Field(40.0, ge=0, description="cost of a new tangent over that of an iteration: factor_solve_ratio")
+    digits: float = Field(20.0, gt=0, description="d, by a tangent: digits an increment gains, times increments ahead")
+    fresh: float = Field(0.1, gt=0, lt=1, description="θ_new, contraction expected of a new tangent")
+
+    def due(self, evidence: Evidence) -> bool:
+        """Iterations left at θ > ratio + iterations left at θ_new; always when θ ≥ 1."""
+        if evidence.contraction is None or evidence.contraction == 0.0:
+            return False
+        if not evidence.contraction < 1.0:
+            return True
+        left, left_new = (self.digits / -np.log10(theta) for theta in (evidence.contraction, self.fresh))
+        return bool(left > self.ratio + left_new)
+
+
 class RangeUnderOne(RefreshRule):
     """When the range of the last series ended before its path did, as in the 2015 paper."""
 
@@ -64,4 +88,4 @@ class Never(RefreshRule):
 
 @hookimpl
 def nlsolve_components() -> Iterable[type[Component]]:
-    return [EveryIteration, EveryM, PoorContraction, RangeUnderOne, Never]
+    return [EveryIteration, EveryM, PoorContraction, CostOptimal, RangeUnderOne, Never]

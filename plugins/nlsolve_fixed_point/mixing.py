@@ -1,0 +1,44 @@
+"""u_{k+1} = u_k + β f_k − (ΔU + β ΔF) γ,  γ = argmin ‖f_k − ΔF γ‖₂ : Anderson's mixing of u ← u + f(u), type II.
+
+Anderson (1965); Walker & Ni (2011), whose rule for an ill-conditioned ΔF is to forget its oldest column.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import scipy.linalg
+
+WORST_CONDITION = 1e8  # of R in ΔF = Q R: beyond it γ amplifies the rounding in f
+
+
+class Mixing:
+    """The last `depth` changes of u and f, and the next u from them.
+
+    ΔU, ΔF : (U, m), m ≤ depth; the columns u_{j+1} − u_j and f_{j+1} − f_j, oldest first.
+    """
+
+    def __init__(self, depth: int, damping: float) -> None:
+        self._depth, self._damping = depth, damping
+        self.forget()
+
+    def forget(self) -> None:
+        """Begin again: f is another function from now on."""
+        self._last: tuple[np.ndarray, np.ndarray] | None = None
+        self._states: list[np.ndarray] = []
+        self._changes: list[np.ndarray] = []
+
+    def next(self, u: np.ndarray, f: np.ndarray) -> np.ndarray:
+        """u_{k+1} from u_k and f_k = f(u_k), shape (U,)."""
+        if self._last is not None and self._depth:
+            self._states = [*self._states, u - self._last[0]][-self._depth :]
+            self._changes = [*self._changes, f - self._last[1]][-self._depth :]
+        self._last = u, f
+        plain = u + self._damping * f
+        while self._changes:
+            changes = np.stack(self._changes, axis=1)
+            q, r = np.linalg.qr(changes)
+            if np.linalg.cond(r) <= WORST_CONDITION:
+                gamma = scipy.linalg.solve_triangular(r, q.T @ f)
+                return plain - (np.stack(self._states, axis=1) + self._damping * changes) @ gamma
+            del self._states[0], self._changes[0]
+        return plain

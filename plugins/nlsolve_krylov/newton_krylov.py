@@ -1,0 +1,83 @@
+"""‖R(u) + J(u) w‖ ≤ η ‖R(u)‖,  u ← u + t w : inexact Newton by GMRES, with the kept K* as preconditioner."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from typing import ClassVar, Literal
+
+import numpy as np
+from pydantic import Field
+
+from nlsolve import KeptTangent, NonlinearProblem, NonlinearSolver, Step
+from nlsolve_krylov.assembled import AssembledOnce
+from nlsolve_krylov.forcing import next_forcing
+from nlsolve_krylov.gmres import gmres
+
+SUFFICIENT_DECREASE = 1e-4  # of ‖R‖, as part of what the inexact step promises
+SMALLEST_FORCING = 1e-6  # below it lies what the next residual will correct anyway
+
+
+class NewtonKrylov(NonlinearSolver):
+    """Dembo, Eisenstat & Steihaug (1982); forcing terms η of Eisenstat & Walker (1996); t is halved until
+
+        ‖R(u + t w)‖ ≤ (1 − 10⁻⁴ t (1 − η)) ‖R(u)‖.
+
+    J w comes from the assembled Jacobian, or without one from the residual's own series: [R(u + a w)]_1. The refresh
+    rule is told the contraction per inner iteration: that is what K* can be held responsible for.
+    """
+
+    kind: Literal["newton-krylov"] = "newton-krylov"
+    forcing: Literal["linear-model", "ratio", "constant"] = Field(
+        "ratio", description="η: choice 1 or choice 2 of Eisenstat and Walker, or the first η throughout"
+    )
+    first_forcing: float = Field(0.1, gt=0, lt=1, description="η of the first iteration")
+    products: Literal["jacobian", "series"] = Field(
+        "series", description="J w by a Jacobian assembled once an iteration, or each by a series of order 1"
+    )
+    dimension: int = Field(40, gt=0, description="largest dimension of the Krylov space")
+    halvings: int = Field(10, ge=0, description="lengths t that may be tried besides the full step; 0: full steps")
+    default_refresh: ClassVar = {"kind": "poor-contraction"}
+
+    def steps(self, problem: NonlinearProblem, tangent: KeptTangent, start: np.ndarray) -> Iterator[Step]:
+        """The iterates u_0, u_1, …"""
+        problem = AssembledOnce(problem)
+        state, eta = start, self.first_forcing
+        residual = problem.residual(state)
+        yield Step(state)
+        while True:
+            size = float(np.linalg.norm(residual))
+            tangent.refresh_if_due(problem, state)
+            if size == 0.0:
+                yield Step(state)
+                continue
+            found = gmres(self._product(problem, state), tangent.solve, -residual, eta * size, self.dimension)
+            length, residual = self._backtrack(problem, state, size, found.solution, found.left / size)
+            state = state + length * found.solution
+            contraction = (found.left / size) ** (1.0 / found.count)
+            tangent.observe(contraction=contraction)
+            yield Step(state, notes={"length": length, "contraction": contraction})
+            size_now = float(np.linalg.norm(residual))
+            eta = max(next_forcing(self.forcing, eta, size_now, size, found.left), SMALLEST_FORCING)
+
+    def _product(self, problem: NonlinearProblem, state: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:
+        """w ↦ J w at the state."""
+        if self.products == "jacobian":
+            return problem.jacobian(state).__matmul__
+
+        def along(w: np.ndarray) -> np.ndarray:
+            expansion = problem.expand(state)
+            expansion.append(w)
+            return expansion.coefficient(1)
+
+        return along
+
+    def _backtrack(
+        self, problem: NonlinearProblem, state: np.ndarray, size: float, step: np.ndarray, eta: float
+    ) -> tuple[float, np.ndarray]:
+        """Step length and the residual there; the last length tried when none is enough."""
+        for halving in range(self.halvings + 1):
+            length = 0.5**halving
+            residual = problem.residual(state + length * step)
+            if np.linalg.norm(residual) <= (1.0 - SUFFICIENT_DECREASE * length * (1.0 - eta)) * size:
+                break
+        return length, residual
