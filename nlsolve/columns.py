@@ -83,8 +83,8 @@ STEPS: dict[str, str] = {
     "difference": "relative difference from the step before, in the norm of the stopping test",
     "range": "a_max of the last series computed for the step",
     "length": "step length of the line search, or the part of the path a series advanced",
-    "contraction": "residual norm over that of the step before, as reported to the refresh rule: newton-krylov per inner "
-    "iteration, scipy-root per value of R",
+    "contraction": "residual norm over that of the step before, as the refresh rule is told (newton-krylov: per inner "
+    "iteration; scipy-root: per value of R)",
     "seconds": "time inside the method so far in the march [s]",
     "probe_x": "place of the probe node, x [mm] (accepted steps)",
     "probe_y": "the same, y [mm]",
