@@ -30,6 +30,9 @@ NEAR_REGULARIZATION = 10.0
 
 NEIGHBOURS = 6
 
+ROUNDING = 1e-6
+"""‖∇S‖ below this part of |S| over the size of the cloud is the rounding of a uniform stress."""
+
 
 @dataclass(frozen=True)
 class Limit:
@@ -46,6 +49,7 @@ LIMITS: dict[str, Limit] = {
     "audit.compressibility": Limit(0.05, "the material is compressed: raise the penalty, or ask for a divergence"),
     "audit.regularization_strain": Limit(0.02, "the regularization rules much of the flow: lower law.regularization"),
     "audit.residual": Limit(1e-5, "the residual is not small beside the stresses: tighten stop.tolerance"),
+    "audit.balance": Limit(0.2, "the stresses are not in balance between the points: choose a finer or evener spacing"),
     "audit.resolution": Limit(1 / 3, "the nodes are too far apart for the layers: choose a finer spacing there"),
     "audit.heating": Limit(50.0, "temperature is constant here: the material would heat up and soften", doubt=False),
 }
@@ -66,11 +70,13 @@ def audit(
         return {"doubt": f"the audits could not be made: {error.detail}"}
     strain_rate = (flow.operators.strain @ velocity.ravel()).reshape(3, -1)
     slopes = np.stack([derivative @ velocity for derivative in gradient])  # (2, N, 2): ∂/∂x and ∂/∂y of u, v
+    stress_slopes = _stress_slopes(flow, strain_rate, gradient, to_nodes)
     found = {
-        **_accelerations(scene, flow, velocity, change, slopes, _stress_slopes(flow, strain_rate, gradient, to_nodes)),
+        **_accelerations(scene, flow, velocity, change, slopes, _size(stress_slopes)),
         "audit.compressibility": _compressibility(flow, velocity, slopes),
         **_regularization(flow, strain_rate),
         "audit.residual": _residual(flow, velocity),
+        "audit.balance": _balance(scene, flow, velocity, change, slopes, stress_slopes),
         "audit.resolution": _resolution(flow, velocity, slopes),
         "audit.heating": _heating(scene, flow, strain_rate, time),
     }
@@ -82,11 +88,38 @@ def _ratio(above: float | np.floating[Any], below: float | np.floating[Any]) -> 
     return float(above / below) if below > 0.0 else float("nan")
 
 
-def _stress_slopes(flow: Flow, strain_rate: Array, gradient: tuple[Any, Any], to_nodes: Any) -> float:
-    """‖∇S‖₂ over the interior nodes: the size of div S before its parts and the pressure cancel."""
+def _stress_slopes(flow: Flow, strain_rate: Array, gradient: tuple[Any, Any], to_nodes: Any) -> Array:
+    """∂S/∂x and ∂S/∂y at the interior nodes, (2, 3, F), from values of S there and gradients of the nodes."""
     at_nodes = stress(flow.law, strain_rate) @ to_nodes.T
-    slopes = np.stack([at_nodes @ derivative.T for derivative in gradient])[..., flow.cloud.interior]
-    return float(np.sqrt(np.einsum("c,acn,acn", CONTRACTION, slopes, slopes)))
+    return np.stack([at_nodes @ derivative.T for derivative in gradient])[..., flow.cloud.interior]
+
+
+def _size(stress_slopes: Array) -> float:
+    """‖∇S‖₂: the size of div S before its parts and the pressure cancel."""
+    return float(np.sqrt(np.einsum("c,acn,acn", CONTRACTION, stress_slopes, stress_slopes)))
+
+
+def _balance(
+    scene: Scene, flow: Flow, velocity: Array, change: Array | None, slopes: Array, stress_slopes: Array
+) -> float:
+    """‖div S + f − ρ dV/dt‖₂ / ‖∇S‖₂ over the interior nodes, where no pressure acts: the balance that was solved, once
+    more by operators that had no part in it. Steady spin: up to 0.17 where the error inside is below 5 %.
+    """
+    if flow.dilatation_rate(flow.unknowns(velocity)) is not None:
+        return float("nan")
+    inside = flow.cloud.interior
+    (xx_x, _, xy_x), (_, yy_y, xy_y) = stress_slopes
+    force = np.stack([xx_x + xy_y, xy_x + yy_y], axis=1)
+    body_force = scene.body_force(flow.cloud.nodes[inside], flow.law)
+    if body_force is not None:
+        force = force + body_force
+    if scene.inertia and change is not None:
+        force = force - scene.density * change[inside]
+    if scene.convection:
+        force = force - scene.density * np.einsum("na,anc->nc", velocity, slopes)[inside]
+    stresses = np.abs(flow.stress_at_points(flow.unknowns(velocity))).max()
+    uniform = ROUNDING * stresses * np.sqrt(len(inside)) / np.ptp(flow.cloud.nodes, axis=0).max()
+    return _ratio(np.linalg.norm(force), max(_size(stress_slopes), uniform))
 
 
 def _accelerations(

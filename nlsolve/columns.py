@@ -53,6 +53,7 @@ RUNS: dict[str, str] = {
     "audit.regularization_stress": "share of Σ |S| that these strain points carry",
     "audit.regularization_strain": "share of Σ ε̄ that they carry; about three times this is the error inside it makes",
     "audit.residual": "‖R‖ over the size of the stresses' forces that cancel in it",
+    "audit.balance": "‖div S + f − ρ dV/dt‖/‖∇S‖ by operators other than those solved with, where no pressure acts",
     "audit.resolution": "share of the change of V between neighbouring inner nodes that its gradients do not explain",
     "audit.heating": "largest adiabatic heating S:ε̇/(ρ c_p) over the time reached, or a time 2π/reference rate [K]",
     "doubt": "what the audits put in doubt, and the way out; empty when nothing",

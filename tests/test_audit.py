@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from cases import setup
-from nlsolve_collocation import MovingLeastSquares
+from nlsolve_collocation import LinearTriangles, MovingLeastSquares
 from nlsolve_laws import PowerLaw
 from nlsolve_scenes import Channel, StirringTool
 from nlsolve_scenes.rings import GradedRings, Rings
@@ -225,3 +225,17 @@ def test_a_residual_small_only_beside_a_huge_penalty_is_in_doubt() -> None:
     assert loose["audit.residual"] > LIMITS["audit.residual"].largest > 100 * tight["audit.residual"]
     assert "tighten stop.tolerance" in loose["doubt"]
     assert tight["doubt"] == ""
+
+
+def test_a_smooth_field_that_is_wrong_on_a_ragged_cloud_is_out_of_balance() -> None:
+    """Triangles on nodes jittered by 0.4 of their distance: 11 % wrong inside, though velocities fit their gradients."""
+    nodes = GradedRings(first=0.08, growth=0.15, spacing=0.4)
+    ragged, even = (
+        summary(spin(nodes=nodes.model_copy(update={"jitter": jitter})), 0.1324, discretizer=LinearTriangles())
+        for jitter in (0.4, 0.0)
+    )
+    assert ragged["velocity_error_inside"] > 0.1 > 0.02 > even["velocity_error_inside"]
+    assert ragged["audit.resolution"] < LIMITS["audit.resolution"].largest
+    assert ragged["audit.balance"] > LIMITS["audit.balance"].largest > even["audit.balance"]
+    assert "not in balance" in ragged["doubt"]
+    assert even["doubt"] == ""
