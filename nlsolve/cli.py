@@ -102,6 +102,9 @@ def run(
         say(note)
     endings = ", ".join(f"{number} {word}" for word, number in results.runs["status"].value_counts().items())
     say(f"{count(len(results.runs))}: {endings}; results in {folder}")
+    failed = results.runs[~results.runs["status"].isin(["converged", "crashed"])]
+    for _, run in failed.drop_duplicates("status").iterrows():
+        say(f"case {run['case']} ended as {run['status']}: {run['message']}")
     if results.crashed:
         first = results.runs[results.runs["status"] == "crashed"].iloc[0]
         say(f"case {first['case']} crashed: {first['message']}")

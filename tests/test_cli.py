@@ -80,6 +80,7 @@ def test_divergence_is_a_result(tmp_path, monkeypatch):
     result = nlsolve("run", write_study(tmp_path))
     assert result.exit_code == 0
     assert "4 cases: 4 diverged" in result.stderr
+    assert "ended as diverged: " in result.stderr
 
 
 def test_a_crash_is_1(tmp_path, monkeypatch):
