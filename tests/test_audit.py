@@ -228,7 +228,7 @@ def test_a_residual_small_only_beside_a_huge_penalty_is_in_doubt() -> None:
 
 
 def test_a_smooth_field_that_is_wrong_on_a_ragged_cloud_is_out_of_balance() -> None:
-    """Triangles on nodes jittered by 0.4 of their distance: 11 % wrong inside, though velocities fit their gradients."""
+    """Triangles on nodes jittered by 0.4 of their distance: 11 % wrong inside, yet velocities fit their gradients."""
     nodes = GradedRings(first=0.08, growth=0.15, spacing=0.4)
     ragged, even = (
         summary(spin(nodes=nodes.model_copy(update={"jitter": jitter})), 0.1324, discretizer=LinearTriangles())
