@@ -230,7 +230,7 @@ class _Builder:
             name
             for parameters in everyone
             for name, value in parameters.items()
-            if any(name not in other or other[name] != value for other in everyone)
+            if any(name in other and other[name] != value for other in everyone)  # one kind's own defaults tell nothing
         }
         return tuple(
             replace(case, swept=tuple(name for name in case.swept if name in differing)) for case in cases.values()
