@@ -1,6 +1,7 @@
 """How large is what a scene left out? Every missing term, estimated from the solution itself.
 
     ρ ∂V/∂t, ρ (V·∇) V beside ∇S      div V beside ε̄      ε₀ beside ε̄      h ∇∇V beside ∇V      S:ε̇/(ρ c_p) beside T
+    V beside the V of another discretisation
 
 N nodes, M strain points. An audit above its limit names the switch to turn on. A term the scene keeps has no audit
 (NaN). All but the heating put the result itself in doubt.
@@ -8,6 +9,7 @@ N nodes, M strain points. An audit above its limit names the switch to turn on. 
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -30,6 +32,12 @@ NEAR_REGULARIZATION = 10.0
 
 NEIGHBOURS = 6
 
+ACCEPTED = 0.05
+"""Relative error of a velocity up to which a result counts as right."""
+
+SAFETY = 1.25
+"""An estimate of an error, times this factor, is to cover the error (Roache 1994)."""
+
 ROUNDING = 1e-6
 """‖∇S‖ below this part of |S| over the size of the cloud is the rounding of a uniform stress."""
 
@@ -51,23 +59,35 @@ LIMITS: dict[str, Limit] = {
     "audit.residual": Limit(1e-5, "the residual is not small beside the stresses: tighten stop.tolerance"),
     "audit.balance": Limit(0.2, "the stresses are not in balance between the points: choose a finer or evener spacing"),
     "audit.resolution": Limit(1 / 3, "the nodes are too far apart for the layers: choose a finer spacing there"),
+    "velocity_error_estimate": Limit(
+        ACCEPTED / SAFETY,
+        "another discretization of the same nodes disagrees: choose a finer or evener spacing, or the other one",
+    ),
     "audit.heating": Limit(50.0, "temperature is constant here: the material would heat up and soften", doubt=False),
 }
 
 
 def audit(
-    scene: Scene, discretizer: Discretizer, flow: Flow, velocity: Array, change: Array | None, time: float
+    scene: Scene,
+    discretizer: Discretizer,
+    flow: Flow,
+    velocity: Array,
+    change: Array | None,
+    time: float,
+    estimate: Callable[[], float] = lambda: float("nan"),
 ) -> dict[str, Any]:
-    """The columns `audit.…` and `doubt` of a solved flow with `velocity` (N, 2).
+    """The columns `audit.…`, `velocity_error_estimate` and `doubt` of a solved flow with `velocity` (N, 2).
 
     change : ∂V/∂t (N, 2) [mm/s²] over the last increment, of moving nodes dV/dt; None for a steady scene.
     time : reached by the march [s], 0 for a steady scene.
+    estimate : of the relative error of the velocity inside, by another discretisation; NaN where there is none.
     """
     try:
         gradient = discretizer.gradient(flow.cloud)
         to_nodes = discretizer.values(flow.operators.strain_points, flow.cloud.nodes)
-    except SolveError as error:
-        return {"doubt": f"the audits could not be made: {error.detail}"}
+        error = estimate()
+    except SolveError as refusal:
+        return {"doubt": f"the audits could not be made: {refusal.detail}"}
     strain_rate = (flow.operators.strain @ velocity.ravel()).reshape(3, -1)
     slopes = np.stack([derivative @ velocity for derivative in gradient])  # (2, N, 2): ∂/∂x and ∂/∂y of u, v
     stress_slopes = _stress_slopes(flow, strain_rate, gradient, to_nodes)
@@ -78,6 +98,7 @@ def audit(
         "audit.residual": _residual(flow, velocity),
         "audit.balance": _balance(scene, flow, velocity, change, slopes, stress_slopes),
         "audit.resolution": _resolution(flow, velocity, slopes),
+        "velocity_error_estimate": error,
         "audit.heating": _heating(scene, flow, strain_rate, time),
     }
     doubts = [limit.sentence for name, limit in LIMITS.items() if limit.doubt and found[name] > limit.largest]

@@ -16,6 +16,7 @@ R is then the gradient of the dissipation potential, its tangent symmetric, and 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
@@ -84,6 +85,10 @@ class Discretizer(Component, ABC):
     """Turns a cloud into operators."""
 
     noun: ClassVar[str] = "discretizer"
+    default_counterpart: ClassVar[Mapping[str, Any] | None] = None
+    """The discretizer that estimates the error of this one's solutions when a study names none: one of another kind,
+    whose errors are not the same; None: no estimate.
+    """
 
     @abstractmethod
     def operators(self, cloud: Cloud, volumetric: bool) -> Operators:

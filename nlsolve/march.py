@@ -17,6 +17,7 @@ from nlsolve.columns import STEPS
 from nlsolve.component import Component
 from nlsolve.discretizers import Discretizer, Operators
 from nlsolve.driver import Budget, Outcome, StoppingTest, solve
+from nlsolve.estimate import discretization_error
 from nlsolve.flow import Convection, Flow, Inertia
 from nlsolve.laws import ConstitutiveLaw, rate_squared
 from nlsolve.ledger import Ledger
@@ -61,6 +62,8 @@ class Setup:
     stop: StoppingTest = field(default_factory=StoppingTest)
     start: Start = field(default_factory=Start)
     budget: Budget = field(default_factory=Budget)
+    counterpart: Discretizer | None = None
+    """Discretises the solved flow once more, for an estimate of its error."""
     record: tuple[float, ...] = ()
     """Times [s] at which the fields are recorded, besides the last."""
 
@@ -198,9 +201,7 @@ class _March:
         if self.moving is not None:
             self.move_nodes(self.moving)
         previous = self.velocity
-        inertia = None
-        if self.scene.inertia:
-            inertia = Inertia(self.scene.density / self.scene.increment, previous)
+        inertia = self.inertia_from(previous)
         outcome = self.iterate_pressure(lambda: self.solve_increment(k, self.flow_of(self.setup.law, inertia)))
         if outcome.status is Status.CONVERGED:
             self.before = previous
@@ -208,6 +209,12 @@ class _March:
                 self.markers.advance(self.cloud, self.velocity, self.time)
             self.record_fields_if_due()
         return outcome
+
+    def inertia_from(self, before: Array | None) -> Inertia | None:
+        """ρ (V − V_k)/Δt with V_k = `before`, where the scene keeps it."""
+        if before is None or not self.scene.inertia:
+            return None
+        return Inertia(self.scene.density / self.scene.increment, before)
 
     def move_nodes(self, moving: MovingNodes) -> None:
         """The cloud and its operators at the end of the increment; velocities come along to shifted nodes."""
@@ -217,7 +224,7 @@ class _March:
             self.velocity = self.velocity + carry @ self.velocity
 
     def build_operators(self) -> None:
-        before = self.operators.volume_points if self.pressure is not None else None
+        before = self.operators if self.pressure is not None else None
         with self.ledger.entry("operators"):
             if self.moving is None:
                 self.operators = self.setup.discretizer.operators(self.cloud, self.volumetric)
@@ -225,26 +232,36 @@ class _March:
                 self.operators = self.moving.operators(self.cloud, self.volumetric)
             self.gradient = self.setup.discretizer.gradient(self.cloud) if self.scene.convection else None
         if before is not None:
-            assert self.operators.volume_points is not None
-            self.pressure = self.setup.discretizer.values(before, self.operators.volume_points) @ self.pressure
+            self.pressure = self.between_volume_points(before, self.operators) @ self.pressure
 
-    def flow_of(self, law: ConstitutiveLaw, inertia: Inertia | None = None) -> Flow:
+    def flow_of(self, law: ConstitutiveLaw, inertia: Inertia | None = None, others: Operators | None = None) -> Flow:
+        """The balance now, by the operators of the march or by `others` of the same cloud."""
+        operators = others or self.operators
+        pressure = self.pressure
+        if others is not None and pressure is not None:
+            pressure = self.between_volume_points(self.operators, others) @ pressure
         return Flow(
             self.cloud,
-            self.operators,
+            operators,
             law,
             self.scene.boundary_velocity(self.cloud, law, self.time),
-            self.scene.penalty_modulus(law, self.rate_squared_at_volume_points()) if self.volumetric else 0.0,
-            self.pressure,
+            self.scene.penalty_modulus(law, self.rate_squared_at_volume_points(operators)) if self.volumetric else 0.0,
+            pressure,
             inertia,
             Convection(self.scene.density, self.gradient) if self.gradient is not None else None,
             self.scene.body_force(self.cloud.nodes[self.cloud.interior], law),
         )
 
-    def rate_squared_at_volume_points(self) -> Array:
+    def rate_squared_at_volume_points(self, operators: Operators) -> Array:
         """ε̄² of the velocity so far, taken at the strain point nearest to each volume point, shape (L,)."""
-        nearest = cKDTree(self.operators.strain_points).query(self.operators.volume_points)[1]
-        return rate_squared((self.operators.strain @ self.velocity.ravel()).reshape(3, -1)[:, nearest])
+        nearest = cKDTree(operators.strain_points).query(operators.volume_points)[1]
+        return rate_squared((operators.strain @ self.velocity.ravel()).reshape(3, -1)[:, nearest])
+
+    def between_volume_points(self, here: Operators, there: Operators) -> Any:
+        """The matrix that takes pressures from the volume points of some operators to those of others."""
+        assert here.volume_points is not None
+        assert there.volume_points is not None
+        return self.setup.discretizer.values(here.volume_points, there.volume_points)
 
     def iterate_pressure(self, solve_once: Callable[[], Outcome]) -> Outcome:
         """Solve, and iterate the pressure until ‖div v‖ ≤ divergence · ‖ε̄‖ where the scene asks for that."""
@@ -308,6 +325,14 @@ class _March:
         self.flow, self.unknowns = flow, unknowns
         self.velocity = flow.velocity(unknowns)
 
+    def error_estimate(self, velocity: Array) -> float:
+        """By the counterpart, of the last increment; NaN without one."""
+        if self.setup.counterpart is None:
+            return float("nan")
+        others = self.setup.counterpart.operators(self.cloud, self.volumetric)
+        flow = self.flow_of(self.setup.law, self.inertia_from(self.before), others)
+        return discretization_error(flow, velocity, self.setup.linear)
+
     # What is left behind.
 
     def record_fields_if_due(self) -> None:
@@ -368,7 +393,8 @@ class _March:
             summary["divergence"] = divergence(flow, velocity)
             summary |= velocity_error(self.scene, flow, velocity, reached)
             summary |= wall_reaction(self.scene, discretizer, flow, velocity, reached)
-            summary |= audit(self.scene, discretizer, flow, velocity, change, reached)
+            estimates = {"estimate": lambda: self.error_estimate(velocity)} if status is Status.CONVERGED else {}
+            summary |= audit(self.scene, discretizer, flow, velocity, change, reached, **estimates)
         steps = pd.DataFrame(self.rows, columns=[name for name in STEPS if name != "case"])
         fields = pd.concat(self.snapshots, ignore_index=True) if self.snapshots else pd.DataFrame()
         return Record(summary, steps, fields)

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from nlsolve.audit import ACCEPTED
 from nlsolve.columns import RUNS
 from nlsolve.status import Status
 
@@ -21,9 +22,6 @@ OUTCOME = "outcome"
 """Column that tables derive from the others, see `outcome`."""
 
 RIGHT, DOUBTED, WRONG = "right", "doubted", "wrong"
-
-ACCEPTED = 0.05
-"""Relative error up to which a converged run is right."""
 
 Run = Mapping[str, Any]
 

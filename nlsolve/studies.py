@@ -31,6 +31,9 @@ SECTIONS = tuple(field.name for field in fields(Setup))
 DEFAULT_KINDS = {"linear": {"kind": "superlu"}, "starter": {"kind": "newton"}}
 """Sections that may be left out, or written without a kind."""
 
+DEFAULTS_OF_KINDS = {"solver": "refresh", "discretizer": "counterpart"}
+"""Sections whose default the kind of another one names, as `default_refresh` and `default_counterpart`."""
+
 DIGEST_LETTERS = 12
 
 
@@ -137,6 +140,7 @@ class _Builder:
         parts: dict[str, Any] = {noun: (registry.union(noun), ...) for noun in CONTRACTS} | {
             "refresh": (registry.union("refresh"), None),  # absent only when there is no solver to ask for its default
             "starter": (registry.union("solver"), ...),
+            "counterpart": (registry.union("discretizer"), None),
             "stop": (StoppingTest, StoppingTest()),
             "start": (Start, Start()),
             "budget": (Budget, Budget()),
@@ -247,11 +251,12 @@ class _Builder:
         """Validate one combination. Raises _Refused."""
         for section, default in DEFAULT_KINDS.items():
             self.complete(document, section, default)
-        solver = document.get("solver")
-        kind = solver.get("kind") if isinstance(solver, dict) else None
-        cls = self.registry.classes("solver").get(kind) if isinstance(kind, str) else None
-        if cls is not None:
-            self.complete(document, "refresh", cls.default_refresh)  # type: ignore[attr-defined]
+        for noun, section in DEFAULTS_OF_KINDS.items():
+            part = document.get(noun)
+            kind = part.get("kind") if isinstance(part, dict) else None
+            named = getattr(self.registry.classes(noun).get(str(kind)), f"default_{section}", None)
+            if named is not None:
+                self.complete(document, section, named)
         try:
             composition = self.model.model_validate(document)
         except ValidationError as error:

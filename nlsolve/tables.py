@@ -15,11 +15,12 @@ from pydantic import BeforeValidator, Field, field_validator, model_validator
 from rich.markup import escape
 from rich.table import Table as RichTable
 
+from nlsolve.audit import ACCEPTED
 from nlsolve.columns import RUNS
 from nlsolve.component import Component
 from nlsolve.condense import COUNT, NO_RUN, WITHIN, Cheapest, counted, key_of
 from nlsolve.errors import ABSENT, Problem, StudyError, did_you_mean
-from nlsolve.outcomes import ACCEPTED, OUTCOME, outcome
+from nlsolve.outcomes import OUTCOME, outcome
 from nlsolve.papers import PaperValues
 from nlsolve.status import Status
 

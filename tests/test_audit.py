@@ -8,9 +8,9 @@ import numpy as np
 import pandas as pd
 import pytest
 from cases import setup
-from nlsolve_collocation import LinearTriangles, MovingLeastSquares
+from nlsolve_collocation import LinearTriangles, MovingLeastSquares, RadialBasis
 from nlsolve_laws import PowerLaw
-from nlsolve_scenes import Channel, StirringTool
+from nlsolve_scenes import Channel, EccentricCylinders, StirringTool
 from nlsolve_scenes.rings import GradedRings, Rings
 
 from nlsolve import Cloud, ConstitutiveLaw, SolveError, Status
@@ -50,7 +50,7 @@ def linear(*rows: tuple[float, float]) -> Any:
 def test_every_limit_and_every_finding_is_a_column() -> None:
     found = audit_of(linear((0, 1), (0, 0)))
     assert set(LIMITS) < set(found) <= set(RUNS)
-    assert set(found) == {name for name in RUNS if name.startswith("audit.")} | {"doubt"}
+    assert set(found) == {name for name in RUNS if name.startswith("audit.")} | {"velocity_error_estimate", "doubt"}
 
 
 # Accelerations: the Newtonian spin u_θ = A r + B/r has τ = −2μB/r², ‖∇S‖ = 4 |τ|/r and ρ (V·∇) V = −ρ u_θ²/r e_r.
@@ -239,3 +239,55 @@ def test_a_smooth_field_that_is_wrong_on_a_ragged_cloud_is_out_of_balance() -> N
     assert ragged["audit.balance"] > LIMITS["audit.balance"].largest > even["audit.balance"]
     assert "not in balance" in ragged["doubt"]
     assert even["doubt"] == ""
+
+
+# The error, estimated by another discretisation.
+
+TRIANGLES = LinearTriangles()
+GRADED = GradedRings(first=0.08, growth=0.15, spacing=0.4)
+
+
+@pytest.mark.parametrize(
+    ("scene", "index", "discretizer"),
+    [
+        (spin(nodes=GRADED), 0.3, MovingLeastSquares()),
+        (spin(nodes=GRADED), 0.1324, MovingLeastSquares(support=15, force_support=18)),  # wrong, and smooth
+        (spin(nodes=GRADED), 0.1324, MovingLeastSquares(degree=1)),
+        (spin(nodes=GRADED), 0.1324, RadialBasis()),
+        (spin(), 1.0, MovingLeastSquares(points="nodes")),
+        (spin(nodes=GRADED, penalty=1e4), 0.3, MovingLeastSquares()),
+        (spin(nodes=GRADED, penalty=1e2, divergence=1e-6), 0.3, MovingLeastSquares(form="conservative")),
+        (spin(nodes=GRADED, horizon=2e-4, inertia=True, motion_of_nodes="lagrangian"), 0.3, MovingLeastSquares()),
+        (EccentricCylinders(penalty=1e4), 1.0, MovingLeastSquares(points="nodes")),
+    ],
+)
+def test_the_estimate_misses_the_error_by_that_of_the_counterpart(scene: Any, index: float, discretizer: Any) -> None:
+    """|‖v − v′‖ − ‖v − v_exact‖| ≤ ‖v′ − v_exact‖, and more as one is over ‖v‖, the other over ‖v_exact‖. A tenth more
+    because v′ is one Newton step from v.
+    """
+    row = summary(scene, index, discretizer=discretizer, counterpart=TRIANGLES)
+    others = summary(scene, index, discretizer=TRIANGLES)["velocity_error_inside"]
+    error, estimate = row["velocity_error_inside"], row["velocity_error_estimate"]
+    assert others < error / 2.0
+    assert abs(estimate - error) < 1.1 * (others + error * estimate)
+
+
+def test_a_wrong_field_without_another_blemish_is_in_doubt_by_the_estimate() -> None:
+    plain, estimated = (
+        summary(spin(nodes=GRADED), 0.1324, discretizer=MovingLeastSquares(degree=1), counterpart=other)
+        for other in (None, TRIANGLES)
+    )
+    assert plain["velocity_error_inside"] > 0.05
+    assert np.isnan(plain["velocity_error_estimate"])
+    assert plain["doubt"] == ""
+    assert "another discretization" in estimated["doubt"]
+
+
+def test_an_estimate_that_cannot_be_made_says_so() -> None:
+    class Fails(LinearTriangles):
+        def operators(self, cloud: Cloud, volumetric: bool) -> Any:
+            raise SolveError(Status.BAD_CLOUD, "the triangles are inside out")
+
+    row = summary(spin(), counterpart=Fails())
+    assert row["status"] == "converged"
+    assert row["doubt"] == "the audits could not be made: the triangles are inside out"

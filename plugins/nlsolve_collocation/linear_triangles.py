@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 import scipy.sparse as sp
@@ -26,6 +26,7 @@ class LinearTriangles(Discretizer):
     """
 
     kind: Literal["delaunay"] = "delaunay"
+    default_counterpart: ClassVar = {"kind": "mls"}
 
     def operators(self, cloud: Cloud, volumetric: bool) -> Operators:
         """B, S and, when asked for, B_θ, S_θ, in conservative form."""
