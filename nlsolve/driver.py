@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import Any, ClassVar, Literal
 
 import numpy as np
@@ -17,6 +18,7 @@ from nlsolve.status import SolveError, Status
 from nlsolve.tangent import Tangent
 
 GROWTH_OF_DIVERGENCE = 1e6  # residual over the larger of its first value and its scale
+VERIFIED = 1e-6  # relative residual below which a state counts as solved where the stopping test does not say
 PATIENCE = 40  # steps without a new smallest residual before a method is said to stagnate
 
 
@@ -36,10 +38,15 @@ class StoppingTest(Component):
         "euclidean", description="of a difference: over all nodes, its largest entry, or the larger of u's and v's norm"
     )
 
+    @property
+    def verified(self) -> float:
+        """The relative residual up to which a state is held to be a solution, whatever the method says of it."""
+        return self.tolerance if self.kind == "residual" else VERIFIED
+
     def met(self, step: Step, residual_norm: float, difference: float) -> bool:
         """Is this step a solution?"""
         if self.kind == "claim":
-            return step.claim
+            return bool(step.claim)
         return (residual_norm if self.kind == "residual" else difference) <= self.tolerance
 
     def difference(self, state: Array, before: Array) -> float:
@@ -69,13 +76,20 @@ class Budget(Component):
 
 @dataclass(frozen=True)
 class Outcome:
-    """How one solve ended: its status, the last state, the residual that counts, and a row a step."""
+    """How one solve ended: its status, the last state, the residual that counts, and a row a step.
+
+    claimed_wrongly, denied_wrongly : the method said converged of a state that is no solution, failed of one that is.
+    blame : of a solve that failed, where the last residual is largest (`NonlinearProblem.blame`).
+    """
 
     status: Status
     detail: str
     state: Array
     residual_norm: float
     steps: tuple[dict[str, Any], ...]
+    claimed_wrongly: bool = False
+    denied_wrongly: bool = False
+    blame: Mapping[str, float] = field(default_factory=dict)
 
 
 @np.errstate(all="ignore")  # what is not finite becomes a status, not a warning
@@ -93,9 +107,14 @@ def solve(
     scale = problem.scale(start)
     before, rows = start, list[dict[str, Any]]()
     residual_norm = np.inf
+    claimed = denied = False
 
     def ended(status: Status, detail: str = "") -> Outcome:
-        return Outcome(status, detail or status.sentence, before, float(residual_norm), tuple(rows))
+        blame: Mapping[str, float] = {}
+        if status is not Status.CONVERGED and np.isfinite(before).all():
+            blame = problem.blame(before, audited.residual(before))
+        sentence = detail or status.sentence
+        return Outcome(status, sentence, before, float(residual_norm), tuple(rows), claimed, denied, blame)
 
     if not np.isfinite(scale):
         return ended(
@@ -109,6 +128,7 @@ def solve(
             with ledger.entry("method"):
                 step = next(iterator, None)
         except SolveError as error:
+            denied |= residual_norm <= stop.verified
             return ended(error.status, error.detail)
         if step is None:
             return ended(Status.STAGNATED, "the method stopped by itself before the stopping test was met")
@@ -126,9 +146,13 @@ def solve(
                 **step.notes,
             }
         )
+        solved = residual_norm <= stop.verified
+        claimed |= step.claim is True and not solved
+        denied |= step.claim is False and solved
         if not np.isfinite(residual_norm):
-            return ended(Status.NON_FINITE)
+            return ended(Status.OUT_OF_DOMAIN if np.isfinite(step.state).all() else Status.NON_FINITE)
         if stop.met(step, residual_norm, difference):
+            claimed |= not solved  # the test of differences speaks for the method
             return ended(Status.CONVERGED)
         if number == 0:
             first = residual_norm

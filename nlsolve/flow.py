@@ -6,6 +6,7 @@ the scene leaves out are absent, not zero. The same formula runs on arrays and o
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -154,6 +155,22 @@ class Flow(NonlinearProblem):
         if self._carried is not None:
             terms += np.abs(self._carried.force(u))
         return float(np.linalg.norm(terms)) or 1.0
+
+    def blame(self, u: Array, residual: Array) -> Mapping[str, float]:
+        """The node where ‖R‖ is largest, the strain rate at the strain point nearest to it, and the share of the strain
+        points where ε̄ < ε₀, whose viscosity is the regularization's own.
+        """
+        forces = np.nan_to_num(np.linalg.norm(residual.reshape(-1, 2), axis=1), nan=np.inf)
+        node = int(self.cloud.interior[forces.argmax()])
+        rate = np.sqrt(rate_squared(self._strain_rate(u)))
+        nearest = np.linalg.norm(self.operators.strain_points - self.cloud.nodes[node], axis=1).argmin()
+        floor = getattr(self.law, "regularization", 0.0)
+        return {
+            "blame_x": float(self.cloud.nodes[node, 0]),
+            "blame_y": float(self.cloud.nodes[node, 1]),
+            "blame_rate": float(rate[nearest]),
+            "blame_regularized": float(np.mean(rate < floor)),
+        }
 
     def velocity(self, u: Array) -> Array:
         """Velocities of all nodes, boundary included, shape (N, 2) [mm/s]."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any, ClassVar
 
@@ -110,6 +110,8 @@ class _March:
         self.residual_norm = float("nan")
         self.pressure: Array | None = None  # at the volume points, iterated where the scene asks for a divergence
         self.pressure_iterations = 0
+        self.claimed_wrongly = self.denied_wrongly = 0
+        self.blame: Mapping[str, float] = {}
         self.sizes: dict[str, float | None] = {"nodes": None, "unknowns": None, "smallest_spacing": None}
         self.moving: MovingNodes | None = None
         self.markers: Markers | None = None
@@ -191,6 +193,7 @@ class _March:
             setup.budget,
             self.start_ledger,
         )
+        self.blame = outcome.blame
         if outcome.status is Status.CONVERGED:
             self.keep(flow, outcome.state)
         return outcome
@@ -297,6 +300,9 @@ class _March:
         )
         solved = outcome.status is Status.CONVERGED
         self.iterations += max(0, len(outcome.steps) - 1)
+        self.claimed_wrongly += outcome.claimed_wrongly
+        self.denied_wrongly += outcome.denied_wrongly
+        self.blame = outcome.blame
         self.rows += [{"increment": k, "time": self.time, "accepted": False, **row} for row in outcome.steps]
         if self.validity_time is None and self.scene.increments and self.tangent.branches > 1:
             self.validity_time = (k - 1) * self.scene.increment
@@ -353,9 +359,18 @@ class _March:
         if validity is None and self.scene.increments and self.increments:
             validity = reached  # the first tangent served to the end
         message = detail if detail == status.sentence or status is Status.CONVERGED else f"{status.sentence}; {detail}"
+        if "blame_x" in self.blame:
+            message += (
+                "; the residual is largest at ({blame_x:.3g}, {blame_y:.3g}), where ε̄ = {blame_rate:.2g} 1/s".format(
+                    **self.blame
+                )
+            )
         summary: dict[str, Any] = {
             "status": status.word,
             "message": message,
+            "said_converged_but_is_not": self.claimed_wrongly,
+            "said_failed_but_is": self.denied_wrongly,
+            **self.blame,
             **self.sizes,
             "cloud_quality": None if self.moving is None else self.moving.quality,
             "increments": self.increments,

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Mapping
 from typing import Any
+
+import numpy as np
 
 from nlsolve.series import Array, Series
 from nlsolve.status import SolveError, Status
@@ -59,6 +62,10 @@ class NonlinearProblem(ABC):
             f"{type(self).__name__} has no secant matrix A(u) with R(u) = A(u) u + c(u): choose a method that needs "
             "its Jacobian only, such as newton or anderson",
         )
+
+    def blame(self, u: Array, residual: Array) -> Mapping[str, float]:
+        """Where R(u) = `residual` is largest, and what is special there: columns `blame_…` of a failed solve."""
+        return {"blame_unknown": int(np.nan_to_num(np.abs(residual), nan=np.inf).argmax())}
 
     def scale(self, u: Array) -> float:
         """What ‖R‖₂ is compared with to call it small; 1 unless the problem knows the size of what cancels in R."""

@@ -23,12 +23,13 @@ class Step:
     """One state a method has reached.
 
     state : (U,) array.
-    claim : the method itself holds this state to be the solution (a series whose range reached the end of its path).
+    claim : True, the method itself holds this state to be the solution (a series whose range reached the end of its
+        path, a library that reports success); False, it says that it failed here; None, it says nothing.
     notes : what the method wants recorded in the `steps` table, e.g. {"range": 1.7, "length": 0.5}.
     """
 
     state: Array
-    claim: bool = False
+    claim: bool | None = None
     notes: Mapping[str, float] = field(default_factory=dict)
 
 

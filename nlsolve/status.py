@@ -13,6 +13,7 @@ class Status(Enum):
     STAGNATED = "the residual stopped falling well above the tolerance"
     DIVERGED = "the residual grew far beyond its first value"
     NON_FINITE = "a residual, a coefficient or an iterate was not a finite number"
+    OUT_OF_DOMAIN = "the method reached a finite state where the residual has no finite value"
     SINGULAR_TANGENT = "a tangent could not be factorised: it is singular to working precision"
     RANGE_EXHAUSTED = "the range of the series fell to nothing before the end of the path"
     BAD_CLOUD = "the nodes no longer carry a discretisation: coincident nodes or supports without enough neighbours"

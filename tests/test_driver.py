@@ -53,6 +53,20 @@ class Walk(NonlinearSolver):
             yield Step(np.full_like(start, self.states[-1]))
 
 
+class Says(NonlinearSolver):
+    """One step, and what the method says of it; then it may break down."""
+
+    state: float
+    claim: bool | None
+    breaks: bool = False
+
+    def steps(self, problem: NonlinearProblem, tangent: KeptTangent, start: np.ndarray) -> Iterator[Step]:
+        yield Step(start)
+        yield Step(np.full_like(start, self.state), claim=self.claim)
+        if self.breaks:
+            raise SolveError(Status.STAGNATED, "no further")
+
+
 IDENTITY = Scalar(lambda u: 1.0 * u)
 ONE = np.array([1.0])
 
@@ -120,10 +134,21 @@ def test_full_newton_steps_diverge_where_damped_ones_converge() -> None:
     assert damped.status is Status.CONVERGED
 
 
-def test_non_finite_residual() -> None:
+def test_a_finite_state_without_a_finite_residual_is_out_of_the_domain() -> None:
     with np.errstate(over="ignore"):
         outcome, _ = run(Scalar(lambda u: np.exp(u)), Walk(states=(1e4,)), None, ONE)
+    assert outcome.status is Status.OUT_OF_DOMAIN
+
+
+def test_non_finite_state() -> None:
+    class Lost(NonlinearSolver):
+        def steps(self, problem: NonlinearProblem, tangent: KeptTangent, start: np.ndarray) -> Iterator[Step]:
+            yield Step(start)
+            yield Step(np.full_like(start, np.nan))
+
+    outcome, _ = run(IDENTITY, Lost(), None, ONE)
     assert outcome.status is Status.NON_FINITE
+    assert outcome.blame == {}
 
 
 def test_non_finite_right_hand_side() -> None:
@@ -211,6 +236,45 @@ def test_stopping_by_claim_believes_the_method() -> None:
     assert outcome.status is Status.CONVERGED
     assert outcome.state[0] == 0.8
     assert outcome.residual_norm == 0.8  # and the residual that counts is told all the same
+    assert outcome.claimed_wrongly
+    assert not outcome.denied_wrongly
+
+
+# What the method says against what is.
+
+
+@pytest.mark.parametrize(("claim", "state", "wrongly"), [(True, 0.5, True), (True, 0.0, False), (None, 0.5, False)])
+def test_a_claim_is_verified_whatever_stops_the_method(claim: bool | None, state: float, wrongly: bool) -> None:
+    outcome, _ = run(IDENTITY, Says(state=state, claim=claim), None, ONE)
+    assert outcome.claimed_wrongly == wrongly
+    assert (outcome.status is Status.CONVERGED) == (state == 0.0)
+
+
+@pytest.mark.parametrize(("state", "wrongly"), [(0.0, True), (0.5, False)])
+def test_a_denial_is_verified(state: float, wrongly: bool) -> None:
+    outcome, _ = run(IDENTITY, Says(state=state, claim=False), None, ONE)
+    assert outcome.denied_wrongly == wrongly
+    assert not outcome.claimed_wrongly
+
+
+def test_a_method_that_breaks_down_at_a_solution_denied_wrongly() -> None:
+    stop = StoppingTest(kind="difference", tolerance=1e-12)
+    outcome, _ = run(IDENTITY, Says(state=1e-9, claim=None, breaks=True), None, ONE, stop=stop)
+    assert outcome.status is Status.STAGNATED
+    assert outcome.denied_wrongly
+
+
+def test_equal_iterates_far_from_a_solution_are_a_wrong_claim_of_the_test_of_differences() -> None:
+    stop = StoppingTest(kind="difference", tolerance=1e-3)
+    outcome, _ = run(IDENTITY, Walk(states=(0.5, 0.5)), None, ONE, stop=stop)
+    assert outcome.status is Status.CONVERGED
+    assert outcome.claimed_wrongly
+
+
+def test_a_failed_solve_names_its_worst_equation() -> None:
+    tilted = Scalar(lambda u: np.array([1.0, 5.0, 2.0]) * u)
+    outcome, _ = run(tilted, Walk(states=(0.5,)), None, np.ones(3))
+    assert outcome.blame == {"blame_unknown": 1}
 
 
 @pytest.mark.parametrize(

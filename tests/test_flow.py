@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from cases import near, run, spin_flow
+from cases import near, run, setup, spin_flow
 from nlsolve_collocation import MovingLeastSquares
 from nlsolve_laws import PowerLaw
 from nlsolve_newton import Newton
@@ -16,8 +16,10 @@ from nlsolve_scenes import Channel, StirringTool
 from nlsolve_scenes.rings import Rings
 
 from nlsolve import Status
+from nlsolve.driver import Budget
 from nlsolve.flow import Flow, Inertia, node_major
 from nlsolve.laws import stress
+from nlsolve.march import march
 from nlsolve.testing import check_problem
 
 SCENE = StirringTool(nodes=Rings(spacing=0.75))
@@ -174,3 +176,25 @@ def test_a_law_without_a_viscosity_at_rest_warns_nobody() -> None:
     problem = spin_flow(0.5, regularization=0.0)
     outcome, _ = run(problem, Newton(), EveryIteration(), np.zeros(2 * len(problem.cloud.interior)))
     assert outcome.status is Status.NON_FINITE
+
+
+def test_the_blame_of_a_failed_flow_is_its_worst_node() -> None:
+    """One node is pushed off a solution: the largest residual is there or beside it, and so is the largest rate."""
+    problem = spin_flow(0.5, regularization=1e-2)
+    u = near(problem, 1.0)
+    place = 40
+    u[2 * place] += 1e4
+    blame = problem.blame(u, problem.residual(u))
+    x, y = problem.cloud.nodes[problem.cloud.interior[place]]
+    assert np.hypot(blame["blame_x"] - x, blame["blame_y"] - y) < 1.0
+    assert blame["blame_rate"] > 1e3
+    assert blame["blame_regularized"] == 0.0
+    at_rest = problem.blame(np.zeros_like(u), problem.residual(np.zeros_like(u)))
+    assert 0.0 < at_rest["blame_regularized"] < 1.0
+
+
+def test_a_failed_case_says_where() -> None:
+    row = march(setup(StirringTool(nodes=Rings(spacing=0.75)), 0.3, budget=Budget(iterations=1))).summary
+    assert row["status"] == "budget spent"
+    assert f"largest at ({row['blame_x']:.3g}, {row['blame_y']:.3g})" in row["message"]
+    assert row["blame_rate"] > 0.0
