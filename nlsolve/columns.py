@@ -51,6 +51,8 @@ RUNS: dict[str, str] = {
     "velocity_error_inside": "the same over the interior nodes alone, whose velocities are not given",
     "velocity_error_estimate": "an estimate of it without an exact solution: how much one Newton step in another "
     "discretisation of the same nodes (section `counterpart`) would change these velocities",
+    "reference_error": "relative ℓ² difference of the velocities of all nodes at the end from those of the case that "
+    "the study makes its reference",
     "torque": "torque of the moving wall on the material per mm of thickness [N mm/mm]",
     "torque_error": "relative error of the torque against the exact solution",
     "force_x": "force of the moving wall on the material per mm of thickness, x [N/mm]",

@@ -360,11 +360,8 @@ class _March:
             validity = reached  # the first tangent served to the end
         message = detail if detail == status.sentence or status is Status.CONVERGED else f"{status.sentence}; {detail}"
         if "blame_x" in self.blame:
-            message += (
-                "; the residual is largest at ({blame_x:.3g}, {blame_y:.3g}), where ε̄ = {blame_rate:.2g} 1/s".format(
-                    **self.blame
-                )
-            )
+            x, y, rate = (self.blame[f"blame_{name}"] for name in ("x", "y", "rate"))
+            message += f"; the residual is largest at ({x:.3g}, {y:.3g}), where ε̄ = {rate:.2g} 1/s"
         summary: dict[str, Any] = {
             "status": status.word,
             "message": message,

@@ -14,6 +14,7 @@ from threadpoolctl import threadpool_limits
 from nlsolve.errors import StudyError, did_you_mean
 from nlsolve.figures import FigureError, Frames, draw, save
 from nlsolve.march import Progress, march
+from nlsolve.references import with_reference_errors
 from nlsolve.report import write_report
 from nlsolve.status import Status
 from nlsolve.store import Part, Store, merge
@@ -141,7 +142,8 @@ def _finished(study: Study, store: Store | None) -> dict[str, Part]:
 
 
 def _merged(study: Study, parts: Mapping[str, Part]) -> Frames:
-    return merge([parts[case.id] for case in study.cases if case.id in parts])
+    frames = merge([parts[case.id] for case in study.cases if case.id in parts])
+    return with_reference_errors(frames, {case.id: case.reference for case in study.cases if case.reference})
 
 
 def _of_case(case: str, frame: pd.DataFrame) -> pd.DataFrame:

@@ -21,8 +21,9 @@ from nlsolve.figures import FigureSpec
 from nlsolve.locate import Place, lines_of
 from nlsolve.march import Setup, Start
 from nlsolve.outcomes import VARIANT
+from nlsolve.references import REFERENCE
 from nlsolve.registry import CONTRACTS, Registry, load_registry
-from nlsolve.sweeps import Document, Point, Sweep, assign_all, leaves, merged, places_of, swept_places
+from nlsolve.sweeps import Document, Point, Setting, Sweep, assign_all, leaves, merged, places_of, swept_places
 from nlsolve.tables import TableSpec, check
 
 SECTIONS = tuple(field.name for field in fields(Setup))
@@ -44,6 +45,9 @@ class Frame(BaseModel):
 
     question: str = Field(min_length=1, description="what the study finds out, in a sentence")
     sweep: tuple[Sweep, ...] = ()
+    reference: dict[str, Any] | None = Field(
+        None, description="parameters that make a case the reference its velocities are compared with"
+    )
     table: tuple[TableSpec, ...] = ()
     figure: tuple[FigureSpec, ...] = ()
     quick: dict[str, Any] = Field(default_factory=dict, description="what --quick changes")
@@ -58,12 +62,14 @@ class Case:
         has named settings, `variant`: the names of this case's.
     swept : the names among them that the study sweeps and that differ between its cases; `variant` stands for all that
         its settings assign.
+    reference : id of the case whose velocities are held to be right; empty without one.
     """
 
     id: str
     setup: Setup
     parameters: Mapping[str, Any]
     swept: tuple[str, ...]
+    reference: str = ""
 
     @property
     def label(self) -> str:
@@ -202,25 +208,22 @@ class _Builder:
 
     def cases(self, frame: Frame) -> tuple[Case, ...]:
         cases: dict[str, Case] = {}
+        references: dict[str, Case] = {}
         sentences: list[str] = []
         named = {name for sweep in frame.sweep if sweep.each is not None for name in sweep.columns}
         base = {name: value for name, value in self.document.items() if name in SECTIONS}
         by_hand = {name: value for name, value in self.overrides.items() if name.split(".")[0] in SECTIONS}
         root: Place = ("quick", "sweep") if self.quick and "sweep" in self.document["quick"] else ("sweep",)
         for points in itertools.product(*(sweep.points((*root, number)) for number, sweep in enumerate(frame.sweep))):
-            source = self.source_of(points, named, by_hand)
-            assigned = {name: value for point in points for name, value in point.values.items()}
-            document = merged({}, base)
-            sections_first = dict(sorted(assigned.items(), key=lambda item: item[0].count(".")))
-            wrong = assign_all(document, sections_first) + assign_all(document, by_hand)  # the hand wins
-            if wrong:
-                sentences += [problem.sentence(source) for problem in wrong]
-                continue
             try:
-                case = self.case(document, points)
+                case = self.combined(base, points, by_hand, named)
+                if frame.reference is not None:
+                    reference = self.reference(frame.reference, base, points, by_hand, named)
+                    case = replace(case, reference=references.setdefault(reference.id, reference).id)
             except _Refused as refused:
-                sentences += [problem.sentence(source) for problem in refused.problems]
+                sentences += refused.sentences
                 continue
+            source = self.source_of(points, named, by_hand)
             twin = cases.setdefault(case.id, case)  # what is set by hand may make two cases one
             if twin.parameters.get(VARIANT) != case.parameters.get(VARIANT):
                 names = [each.parameters[VARIANT] for each in (twin, case)]
@@ -229,6 +232,7 @@ class _Builder:
                 place = next(point.place for point in points if point.name)
                 sentences.append(Problem(place, ABSENT, same).sentence(source))
         self.refuse_sentences(sentences)
+        cases = references | cases  # first, so that all others can be compared with them as they end
         everyone = [case.parameters for case in cases.values()]
         differing = {
             name
@@ -240,6 +244,43 @@ class _Builder:
             replace(case, swept=tuple(name for name in case.swept if name in differing)) for case in cases.values()
         )
 
+    def combined(self, base: Document, points: tuple[Point, ...], by_hand: Mapping[str, Any], named: set[str]) -> Case:
+        """The case of one combination, the hand winning. Raises _Refused with sentences."""
+        source = self.source_of(points, named, by_hand)
+        assigned = {name: value for point in points for name, value in point.values.items()}
+        document = merged({}, base)
+        sections_first = dict(sorted(assigned.items(), key=lambda item: item[0].count(".")))
+        wrong = assign_all(document, sections_first) + assign_all(document, by_hand)
+        if wrong:
+            raise _Refused([problem.sentence(source) for problem in wrong])
+        try:
+            return self.case(document, points)
+        except _Invalid as invalid:
+            raise _Refused([problem.sentence(source) for problem in invalid.problems]) from invalid
+
+    def reference(
+        self,
+        table: Mapping[str, Any],
+        base: Document,
+        points: tuple[Point, ...],
+        by_hand: Mapping[str, Any],
+        named: set[str],
+    ) -> Case:
+        """The same combination as the reference has it: what its table sets, nobody else does."""
+        made = Setting.model_validate({"name": REFERENCE, **table}).point((REFERENCE,))
+
+        def others(values: Mapping[str, Any]) -> dict[str, Any]:
+            return {
+                name: value
+                for name, value in values.items()
+                if not any(f"{name}.".startswith(f"{settled}.") for settled in made.values)
+            }
+
+        left = tuple(replace(point, values=others(point.values), name="") for point in points)
+        if not any(point.name for point in points):
+            made = replace(made, name="")
+        return self.combined(base, (*left, made), others(by_hand), named | set(made.values))
+
     def source_of(self, points: tuple[Point, ...], named: set[str], by_hand: Mapping[str, Any]) -> Source:
         """Where the values of one combination were written; the hand wins here too."""
         hand = dict(leaves(by_hand))
@@ -248,7 +289,7 @@ class _Builder:
         return replace(self.source, aliases=known | {name: self.source.at(place) for name, place in mine.items()})
 
     def case(self, document: Document, points: tuple[Point, ...]) -> Case:
-        """Validate one combination. Raises _Refused."""
+        """Validate one combination. Raises _Invalid."""
         for section, default in DEFAULT_KINDS.items():
             self.complete(document, section, default)
         for noun, section in DEFAULTS_OF_KINDS.items():
@@ -260,21 +301,21 @@ class _Builder:
         try:
             composition = self.model.model_validate(document)
         except ValidationError as error:
-            raise _Refused(problems_in(error, self.model, document)) from error
+            raise _Invalid(problems_in(error, self.model, document)) from error
         setup = Setup(**{name: getattr(composition, name) for name in SECTIONS})
         if setup.stop.kind == "claim" and not setup.solver.claims:
             sentence = f"the solver {setup.solver.kind_name()!r} never claims a solution; use residual or difference"
-            raise _Refused([Problem(("stop", "kind"), "claim", sentence)])
+            raise _Invalid([Problem(("stop", "kind"), "claim", sentence)])
         try:
             setup.law.continuation(setup.start.by, setup.start.values)
         except ValidationError as error:
             reasons = "; ".join(detail["msg"] for detail in error.errors())
-            raise _Refused(
+            raise _Invalid(
                 [Problem(("start", "values"), list(setup.start.values), f"refused by the law: {reasons}")]
             ) from error
         except ValueError as error:
             reason = str(error).removeprefix(f"start.by = {setup.start.by!r}: ")
-            raise _Refused([Problem(("start", "by"), setup.start.by, reason)]) from error
+            raise _Invalid([Problem(("start", "by"), setup.start.by, reason)]) from error
         plain = json.loads(composition.model_dump_json())
         canonical = json.dumps(plain, sort_keys=True, separators=(",", ":"))
         digest = hashlib.sha256(canonical.encode()).hexdigest()[:DIGEST_LETTERS]
@@ -299,12 +340,20 @@ class _Builder:
             document[section] = {**default, **given}
 
 
-class _Refused(Exception):
-    """A combination that does not make a case."""
+class _Invalid(Exception):
+    """What is wrong with a document that does not make a case."""
 
     def __init__(self, problems: list[Problem]) -> None:
         super().__init__()
         self.problems = problems
+
+
+class _Refused(Exception):
+    """A combination that does not make a case, in sentences with their places."""
+
+    def __init__(self, sentences: list[str]) -> None:
+        super().__init__()
+        self.sentences = sentences
 
 
 def _syntax(path: str, message: str) -> str:
