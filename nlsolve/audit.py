@@ -35,8 +35,10 @@ NEIGHBOURS = 6
 ACCEPTED = 0.05
 """Relative error of a velocity up to which a result counts as right."""
 
-SAFETY = 1.25
-"""An estimate of an error, times this factor, is to cover the error (Roache 1994)."""
+SAFETY = 1.5
+"""An estimate of an error, times this factor, is to cover the error (Roache 1994 on such factors): over the cases of
+studies/discretizers.toml the estimate is never below 0.68 of the error inside.
+"""
 
 ROUNDING = 1e-6
 """‖∇S‖ below this part of |S| over the size of the cloud is the rounding of a uniform stress."""
