@@ -32,7 +32,7 @@ RUNS: dict[str, str] = {
     "start_factorizations": "matrices factorised on the way to the first state",
     "start_triangular_solves": "pairs of triangular solves on the way to the first state",
     "start_residuals": "residuals evaluated on the way to the first state",
-    "seconds": "time inside the method: its own work and all it asked for [s]",
+    "seconds": "processor time inside the method: its own work and all it asked for [s]",
     "seconds_factorization": "of it, factorising [s]",
     "seconds_triangular_solve": "of it, triangular solves [s]",
     "seconds_jacobian": "of it, assembling Jacobians [s]",

@@ -27,7 +27,10 @@ KINDS = ("residual", "jacobian", "matrix_product", "factorization", "triangular_
 
 @dataclass
 class Ledger:
-    """Counts and seconds by kind of work; the kind "method" holds the time spent inside a method, all included."""
+    """Counts and seconds by kind of work; the kind "method" holds the time spent inside a method, all included.
+
+    Seconds are processor seconds of this process, which other programs on the machine do not lengthen.
+    """
 
     counts: Counter[str] = field(default_factory=Counter)
     seconds: Counter[str] = field(default_factory=Counter)
@@ -35,11 +38,11 @@ class Ledger:
     @contextmanager
     def entry(self, kind: str) -> Iterator[None]:
         """Count one piece of work of this kind and the time it takes, even if it fails."""
-        begun = time.perf_counter()
+        begun = time.process_time()
         try:
             yield
         finally:
-            self.seconds[kind] += time.perf_counter() - begun  # type: ignore[assignment]
+            self.seconds[kind] += time.process_time() - begun  # type: ignore[assignment]
             self.counts[kind] += 1
 
     def each(self, kind: str) -> float:

@@ -157,7 +157,7 @@ class _March:
     def first_state(self) -> Outcome:
         """Quasi-static state at t = 0 by continuation of the law; a steady scene's last stage is the case's own."""
         *easier, target = self.setup.law.continuation(self.setup.start.by, self.setup.start.values)
-        begun = time.perf_counter()
+        begun = time.process_time()
         outcome, law = None, target
         for law in easier:
             outcome = self.start_stage(law)
@@ -166,7 +166,7 @@ class _March:
         if self.scene.increments and (outcome is None or outcome.status is Status.CONVERGED):
             law = target
             outcome = self.iterate_pressure(lambda: self.start_stage(target))
-        self.seconds_start = time.perf_counter() - begun
+        self.seconds_start = time.process_time() - begun
         self.tangent = Tangent(self.setup.linear, self.setup.refresh, self.ledger, self.start_tangent.factors)
         if outcome is not None and outcome.status is not Status.CONVERGED:
             by = self.setup.start.by
