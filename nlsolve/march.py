@@ -23,6 +23,7 @@ from nlsolve.ledger import Ledger
 from nlsolve.linear import LinearSolver
 from nlsolve.measures import divergence, nodal_fields, velocity_error, wall_reaction
 from nlsolve.motion import Markers, MovingNodes
+from nlsolve.predictors import Predictor
 from nlsolve.pressure import Mixing
 from nlsolve.scenes import Scene
 from nlsolve.series import Array
@@ -58,6 +59,7 @@ class Setup:
     solver: NonlinearSolver
     refresh: RefreshRule
     starter: NonlinearSolver
+    predictor: Predictor
     stop: StoppingTest = field(default_factory=StoppingTest)
     start: Start = field(default_factory=Start)
     budget: Budget = field(default_factory=Budget)
@@ -141,7 +143,8 @@ class _March:
         if self.scene.motion_of_nodes == "lagrangian":
             self.moving = MovingNodes(self.scene, self.setup.discretizer, self.initial)
         self.build_operators()
-        self.velocity = np.zeros_like(self.cloud.nodes)
+        self.velocity = self.guess = np.zeros_like(self.cloud.nodes)
+        self.past: list[Array] = []  # velocities of the same nodes at the ends of the increments, latest first
         self.before: Array | None = None  # velocity one increment earlier
         probe = self.scene.probe
         inside = self.cloud.interior
@@ -183,7 +186,7 @@ class _March:
             flow,
             setup.starter,
             self.start_tangent,
-            flow.unknowns(self.velocity),
+            flow.unknowns(self.guess),
             StoppingTest(kind="residual", tolerance=setup.start.tolerance),
             setup.budget,
             self.start_ledger,
@@ -198,6 +201,8 @@ class _March:
         if self.moving is not None:
             self.move_nodes(self.moving)
         previous = self.velocity
+        self.past = [previous, *self.past][: self.setup.predictor.depth]
+        self.guess = self.setup.predictor.guess(self.past)
         inertia = None
         if self.scene.inertia:
             inertia = Inertia(self.scene.density / self.scene.increment, previous)
@@ -215,6 +220,7 @@ class _March:
         self.build_operators()
         if carry is not None:
             self.velocity = self.velocity + carry @ self.velocity
+            self.past = [velocity + carry @ velocity for velocity in self.past]
 
     def build_operators(self) -> None:
         before = self.operators.volume_points if self.pressure is not None else None
@@ -276,7 +282,7 @@ class _March:
         """The case's own method on one increment; its rows, counts and largest residual are kept."""
         setup = self.setup
         outcome = solve(
-            flow, setup.solver, self.tangent, flow.unknowns(self.velocity), setup.stop, setup.budget, self.ledger
+            flow, setup.solver, self.tangent, flow.unknowns(self.guess), setup.stop, setup.budget, self.ledger
         )
         solved = outcome.status is Status.CONVERGED
         self.iterations += max(0, len(outcome.steps) - 1)
@@ -306,7 +312,7 @@ class _March:
     def keep(self, flow: Flow, unknowns: Array) -> None:
         """A solved state: what is measured, and where the next solve begins."""
         self.flow, self.unknowns = flow, unknowns
-        self.velocity = flow.velocity(unknowns)
+        self.velocity = self.guess = flow.velocity(unknowns)
 
     # What is left behind.
 

@@ -22,14 +22,25 @@ from pydantic_core import PydanticCustomError, to_jsonable_python
 from nlsolve import hookspecs
 from nlsolve.component import Component
 from nlsolve.discretizers import Discretizer
+from nlsolve.globalization import Globalization
 from nlsolve.laws import ConstitutiveLaw
 from nlsolve.linear import LinearSolver
+from nlsolve.predictors import Predictor
 from nlsolve.scenes import Scene
 from nlsolve.solvers import NonlinearSolver, RefreshRule
 
 CONTRACTS: dict[str, type[Component]] = {
     contract.noun: contract
-    for contract in (Scene, ConstitutiveLaw, Discretizer, LinearSolver, NonlinearSolver, RefreshRule)
+    for contract in (
+        Scene,
+        ConstitutiveLaw,
+        Discretizer,
+        LinearSolver,
+        NonlinearSolver,
+        RefreshRule,
+        Predictor,
+        Globalization,
+    )
 }
 """What a plugin may offer, by noun, in the order of a study file."""
 

@@ -28,7 +28,7 @@ from nlsolve.tables import TableSpec, check
 SECTIONS = tuple(field.name for field in fields(Setup))
 """The parts of a study that a case is made of, and that can be swept."""
 
-DEFAULT_KINDS = {"linear": {"kind": "superlu"}, "starter": {"kind": "newton"}}
+DEFAULT_KINDS = {"linear": {"kind": "superlu"}, "starter": {"kind": "newton"}, "predictor": {"kind": "previous"}}
 """Sections that may be left out, or written without a kind."""
 
 DIGEST_LETTERS = 12
@@ -134,7 +134,7 @@ class _Builder:
         self.overrides = {**quick_values, **overrides}
         self.source = Source(source.file, source.lines, aliases | {name: f"{source.file}, --set" for name in overrides})
         self.refuse(assign_all(self.document, self.overrides))
-        parts: dict[str, Any] = {noun: (registry.union(noun), ...) for noun in CONTRACTS} | {
+        parts: dict[str, Any] = {noun: (registry.union(noun), ...) for noun in CONTRACTS if noun in SECTIONS} | {
             "refresh": (registry.union("refresh"), None),  # absent only when there is no solver to ask for its default
             "starter": (registry.union("solver"), ...),
             "stop": (StoppingTest, StoppingTest()),

@@ -1,4 +1,4 @@
-"""Anderson, Broyden, Picard, Newton-Krylov, their line searches, and SciPy's methods under the same ledger."""
+"""Anderson, Broyden, Picard, Newton-Krylov, and SciPy's methods under the same ledger."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from cases import PLAIN, near, run, spin_flow
 from nlsolve_collocation import MovingLeastSquares
 from nlsolve_fixed_point import Anderson, Broyden, Picard
 from nlsolve_fixed_point.mixing import Mixing
+from nlsolve_globalization import Backtracking, Cubic, FullSteps, NonMonotone
 from nlsolve_krylov import NewtonKrylov, TrustRegion
 from nlsolve_krylov.forcing import next_forcing
 from nlsolve_krylov.gmres import gmres
 from nlsolve_krylov.trust_region import cauchy_point, dogleg
 from nlsolve_laws import PowerLaw
 from nlsolve_newton import ModifiedNewton, Newton, PseudoTransient
-from nlsolve_newton.line_search import LeastResidual
 from nlsolve_peers import ScipyRoot
 from nlsolve_refresh import CostOptimal, EveryIteration, Never, PoorContraction
 from nlsolve_scenes import StirringTool
@@ -47,11 +47,15 @@ SOLVERS: tuple[NonlinearSolver, ...] = (
     NewtonKrylov(),
     NewtonKrylov(products="jacobian"),
     NewtonKrylov(forcing="linear-model"),
-    NewtonKrylov(forcing="constant", halvings=0),
+    NewtonKrylov(forcing="constant", globalization=FullSteps()),
     NewtonKrylov(dimension=2),
-    Newton(line_search="parabola"),
-    Newton(line_search="non-monotone"),
-    ModifiedNewton(line_search="non-monotone"),
+    NewtonKrylov(globalization=Cubic()),
+    Newton(globalization=Cubic()),
+    Newton(globalization=NonMonotone()),
+    ModifiedNewton(globalization=NonMonotone()),
+    Anderson(globalization=Backtracking()),
+    Picard(globalization=Cubic()),
+    Broyden(globalization=Backtracking()),
     TrustRegion(),
     PseudoTransient(),
     PseudoTransient(shift=1e-3),
@@ -115,7 +119,7 @@ def test_anderson_on_a_linear_problem_is_gmres(k: int) -> None:
 def test_without_depth_anderson_is_modified_newton() -> None:
     flow = spin_flow(0.5)
     np.testing.assert_array_equal(
-        iterates(flow, Anderson(depth=0), flow, 4), iterates(flow, ModifiedNewton(halvings=0), flow, 4)
+        iterates(flow, Anderson(depth=0), flow, 4), iterates(flow, ModifiedNewton(globalization=FullSteps()), flow, 4)
     )
 
 
@@ -289,43 +293,6 @@ def test_picard_says_when_there_is_no_secant_matrix() -> None:
     assert outcome.detail.startswith("Bare has no secant matrix A(u) with R(u) = A(u) u + c(u)")
 
 
-# Line searches.
-
-
-class Scripted(SmallProblem):
-    """‖R(u + t w)‖ as written down, in order of asking."""
-
-    def __init__(self, *sizes: float) -> None:
-        self.sizes = list(sizes)
-
-    def residual(self, u: Any) -> Any:
-        return np.array([self.sizes.pop(0)])
-
-
-def test_a_non_monotone_search_bears_growth_up_to_the_largest_of_its_memory() -> None:
-    state, w = np.zeros(1), np.ones(1)
-    for memory, expected in ((1, 0.5), (10, 1.0)):
-        search = LeastResidual(halvings=10, memory=memory, interpolate=False)
-        search.length(Scripted(1.0), state, np.array([2.0]), w)
-        length, residual = search.length(Scripted(1.5, 0.9), state, np.array([1.0]), w)
-        assert length == expected
-        assert residual[0] == {1: 0.9, 10: 1.5}[memory]
-
-
-def test_the_parabola_search_goes_to_the_least_point_of_the_parabola() -> None:
-    """‖R‖² = 1 − 2 t + 5 t² through ‖R(1)‖ = 2: least at t = 0.2; and no shorter than a tenth at once."""
-    search = LeastResidual(halvings=10, memory=1, interpolate=True)
-    for first, expected in ((2.0, 0.2), (100.0, 0.1), (1.001, 0.4995)):
-        length, _ = search.length(Scripted(first, 0.5), np.zeros(1), np.array([1.0]), np.ones(1))
-        assert length == pytest.approx(expected, rel=1e-3)
-
-
-def test_a_search_that_finds_no_decrease_takes_the_smallest_residual() -> None:
-    search = LeastResidual(halvings=2, memory=1, interpolate=False)
-    length, residual = search.length(Scripted(3.0, 1.5, 2.0), np.zeros(1), np.array([1.0]), np.ones(1))
-    assert (length, residual[0]) == (0.5, 1.5)
-
-
 # Pseudo-transient continuation.
 
 
@@ -374,7 +341,9 @@ def test_the_cauchy_point_is_the_least_of_the_model_along_the_steepest_descent()
 def test_in_a_wide_region_the_trust_region_method_is_modified_newton() -> None:
     flow = spin_flow(0.5)
     np.testing.assert_allclose(
-        iterates(flow, TrustRegion(), flow, 4), iterates(flow, ModifiedNewton(halvings=0), flow, 4), rtol=1e-12
+        iterates(flow, TrustRegion(), flow, 4),
+        iterates(flow, ModifiedNewton(globalization=FullSteps()), flow, 4),
+        rtol=1e-12,
     )
 
 
@@ -445,7 +414,7 @@ def test_a_failure_inside_scipy_is_a_status() -> None:
         (NewtonKrylov, {"forcing": "eager"}),
         (NewtonKrylov, {"first_forcing": 1.0}),
         (NewtonKrylov, {"dimension": 0}),
-        (Newton, {"line_search": "cubic"}),
+        (Newton, {"globalization": {"kind": "square"}}),
         (CostOptimal, {"fresh": 1.0}),
         (ScipyRoot, {"method": "lm"}),
     ],
