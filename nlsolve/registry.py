@@ -143,21 +143,25 @@ class Registry:
         failed = f"; {len(self._failures)} plugin(s) failed, see `nlsolve plugins`" if self._failures else ""
         return f"no such {noun}; {guess}installed: {', '.join(classes) or 'none'}{failed}"
 
+    def known(self, noun: str, value: object) -> object:
+        """A component, or a table with an installed kind, as it is; PydanticCustomError for anything else."""
+        if isinstance(value, Component):
+            return value
+        if not isinstance(value, Mapping):
+            raise PydanticCustomError("table_expected", 'should be a table with a kind, like { kind = "…" }')
+        if "kind" not in value:
+            kinds = ", ".join(self.classes(noun)) or "none"
+            raise PydanticCustomError("kind_missing", "required, and missing; installed: {kinds}", {"kinds": kinds})
+        complaint = self.complaint(noun, value["kind"])
+        if complaint is not None:
+            raise PydanticCustomError("kind_unknown", "{complaint}", {"complaint": complaint})
+        return value
+
     def union(self, noun: str) -> Any:
         """The pydantic type of a section: one of the installed classes, discriminated on `kind`."""
 
         def known(value: object) -> object:
-            if isinstance(value, Component):
-                return value
-            if not isinstance(value, Mapping):
-                raise PydanticCustomError("table_expected", 'should be a table with a kind, like { kind = "…" }')
-            if "kind" not in value:
-                kinds = ", ".join(self.classes(noun)) or "none"
-                raise PydanticCustomError("kind_missing", "required, and missing; installed: {kinds}", {"kinds": kinds})
-            complaint = self.complaint(noun, value["kind"])
-            if complaint is not None:
-                raise PydanticCustomError("kind_unknown", "{complaint}", {"complaint": complaint})
-            return value
+            return self.known(noun, value)
 
         members = tuple(self.classes(noun).values())
         if len(members) > 1:

@@ -210,7 +210,7 @@ def test_a_strangers_globalization_is_taken(monkeypatch: pytest.MonkeyPatch) -> 
         ({"trials": 3}, ("globalization",), "required, and missing; installed: backtracking, cubic"),
         ({"kind": "cubic", "trials": 0}, ("globalization", "trials"), "greater than 0"),
         ({"kind": "none", "trials": 3}, ("globalization", "trials"), "Extra inputs are not permitted"),
-        ("cubic", ("globalization",), "instance of Globalization"),
+        ("cubic", ("globalization",), "should be a table with a kind"),
     ],
 )
 def test_what_is_wrong_is_told_in_its_own_place(given: Any, place: tuple[str, ...], sentence: str) -> None:
