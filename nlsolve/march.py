@@ -5,16 +5,14 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 import pandas as pd
-from pydantic import Field
 from scipy.spatial import cKDTree
 
 from nlsolve.audit import audit
 from nlsolve.columns import STEPS
-from nlsolve.component import Component
 from nlsolve.discretizers import Discretizer, Operators
 from nlsolve.driver import Budget, Outcome, StoppingTest, solve
 from nlsolve.flow import Convection, Flow, Inertia
@@ -28,24 +26,9 @@ from nlsolve.pressure import Mixing
 from nlsolve.scenes import Scene
 from nlsolve.series import Array
 from nlsolve.solvers import NonlinearSolver, RefreshRule
+from nlsolve.start import Stage, Start, walk
 from nlsolve.status import SolveError, Status
 from nlsolve.tangent import Tangent
-
-
-class Start(Component):
-    """How the first state is reached from rest, where no series and no Newton step has a useful range: continuation.
-
-    The law is solved with its field `by` at each of `values` larger than the target, then at the target, by the
-    starting method with a new tangent each iteration. The work is counted apart from the march (columns `start_…`).
-    """
-
-    noun: ClassVar[str] = "start"
-
-    by: str = Field(
-        "index", description="field of the law that is varied: index (from 1) or regularization (from large)"
-    )
-    values: tuple[float, ...] = Field((1.0, 0.5, 0.3, 0.2), description="its values on the way, in order")
-    tolerance: float = Field(1e-10, gt=0, description="relative residual of the first state")
 
 
 @dataclass(frozen=True)
@@ -153,44 +136,47 @@ class _March:
         )
 
     def first_state(self) -> Outcome:
-        """Quasi-static state at t = 0 by continuation of the law; a steady scene's last stage is the case's own."""
-        *easier, target = self.setup.law.continuation(self.setup.start.by, self.setup.start.values)
-        begun = time.perf_counter()
-        outcome, law = None, target
-        for law in easier:
-            outcome = self.start_stage(law)
-            if outcome.status is not Status.CONVERGED:
-                break
-        if self.scene.increments and (outcome is None or outcome.status is Status.CONVERGED):
-            law = target
-            outcome = self.iterate_pressure(lambda: self.start_stage(target))
-        self.seconds_start = time.perf_counter() - begun
-        self.tangent = Tangent(self.setup.linear, self.setup.refresh, self.ledger, self.start_tangent.factors)
-        if outcome is not None and outcome.status is not Status.CONVERGED:
-            by = self.setup.start.by
-            detail = f"on the way to the first state, at {by} = {getattr(law, by):g}: {outcome.detail}"
-            return Outcome(outcome.status, detail, outcome.state, outcome.residual_norm, ())
-        if self.scene.increments == 0:
-            outcome = self.iterate_pressure(lambda: self.solve_increment(0, self.flow_of(target)))
-        assert outcome is not None
+        """Quasi-static state at t = 0 by continuation; a steady scene's last stage is the case's own."""
+        steady, start = not self.scene.increments, self.setup.start
+
+        def solve_stage(stage: Stage, last: bool) -> Outcome:
+            if not last:
+                return self.start_stage(stage)
+            if not steady:
+                return self.iterate_pressure(lambda: self.start_stage(stage))
+            self.take_over()
+            return self.iterate_pressure(lambda: self.solve_increment(0, self.flow_of(stage.law)))
+
+        outcome, stage = walk(start, self.setup.law, solve_stage)
+        self.take_over()
         if outcome.status is Status.CONVERGED:
             if self.scene.markers or self.scene.shifting:
                 self.markers = Markers(self.scene, self.setup.discretizer, self.initial, self.velocity)
             self.record_fields_if_due()
+        elif not (steady and self.tangent.branches):
+            detail = f"on the way to the first state, at {start.by} = {stage.value:g}: {outcome.detail}"
+            return Outcome(outcome.status, detail, outcome.state, outcome.residual_norm, ())
         return outcome
 
-    def start_stage(self, law: ConstitutiveLaw) -> Outcome:
-        setup = self.setup
-        flow = self.flow_of(law)
+    def take_over(self) -> None:
+        """The case's own tangent, in the ordering that the start settled on, unless it is there already."""
+        if not self.tangent.branches:
+            self.tangent = Tangent(self.setup.linear, self.setup.refresh, self.ledger, self.start_tangent.factors)
+
+    def start_stage(self, stage: Stage) -> Outcome:
+        """The starting method on one stage; a state it converges to is kept."""
+        setup, begun = self.setup, time.perf_counter()
+        flow = self.flow_of(stage.law, load=stage.load)
         outcome = solve(
             flow,
             setup.starter,
             self.start_tangent,
             flow.unknowns(self.guess),
             StoppingTest(kind="residual", tolerance=setup.start.tolerance),
-            setup.budget,
+            setup.start.budget(setup.budget),
             self.start_ledger,
         )
+        self.seconds_start += time.perf_counter() - begun
         if outcome.status is Status.CONVERGED:
             self.keep(flow, outcome.state)
         return outcome
@@ -234,17 +220,18 @@ class _March:
             assert self.operators.volume_points is not None
             self.pressure = self.setup.discretizer.values(before, self.operators.volume_points) @ self.pressure
 
-    def flow_of(self, law: ConstitutiveLaw, inertia: Inertia | None = None) -> Flow:
+    def flow_of(self, law: ConstitutiveLaw, inertia: Inertia | None = None, load: float = 1.0) -> Flow:
+        body_force = self.scene.body_force(self.cloud.nodes[self.cloud.interior], law)
         return Flow(
             self.cloud,
             self.operators,
             law,
-            self.scene.boundary_velocity(self.cloud, law, self.time),
+            load * self.scene.boundary_velocity(self.cloud, law, self.time),
             self.scene.penalty_modulus(law, self.rate_squared_at_volume_points()) if self.volumetric else 0.0,
             self.pressure,
             inertia,
             Convection(self.scene.density, self.gradient) if self.gradient is not None else None,
-            self.scene.body_force(self.cloud.nodes[self.cloud.interior], law),
+            None if body_force is None else load * body_force,
         )
 
     def rate_squared_at_volume_points(self) -> Array:
@@ -289,7 +276,8 @@ class _March:
         self.rows += [{"increment": k, "time": self.time, "accepted": False, **row} for row in outcome.steps]
         if self.validity_time is None and self.scene.increments and self.tangent.branches > 1:
             self.validity_time = (k - 1) * self.scene.increment
-        self.residual_norm = float(np.fmax(self.residual_norm, outcome.residual_norm))
+        before = self.residual_norm if k else np.nan  # of a steady scene the last solve counts: a start may repeat it
+        self.residual_norm = float(np.fmax(before, outcome.residual_norm))
         if solved:
             self.keep(flow, outcome.state)
             self.increments = max(k, 1)

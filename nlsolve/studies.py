@@ -19,9 +19,10 @@ from nlsolve.driver import Budget, StoppingTest
 from nlsolve.errors import ABSENT, Problem, Source, StudyError, did_you_mean, problems_in
 from nlsolve.figures import FigureSpec
 from nlsolve.locate import Place, lines_of
-from nlsolve.march import Setup, Start
+from nlsolve.march import Setup
 from nlsolve.outcomes import VARIANT
 from nlsolve.registry import CONTRACTS, Registry, load_registry
+from nlsolve.start import LOAD, Start
 from nlsolve.sweeps import Document, Point, Sweep, assign_all, leaves, merged, places_of, swept_places
 from nlsolve.tables import TableSpec, check
 
@@ -261,15 +262,16 @@ class _Builder:
             sentence = f"the solver {setup.solver.kind_name()!r} never claims a solution; use residual or difference"
             raise _Refused([Problem(("stop", "kind"), "claim", sentence)])
         try:
-            setup.law.continuation(setup.start.by, setup.start.values)
+            setup.start.stages(setup.law)
         except ValidationError as error:
             reasons = "; ".join(detail["msg"] for detail in error.errors())
             raise _Refused(
                 [Problem(("start", "values"), list(setup.start.values), f"refused by the law: {reasons}")]
             ) from error
         except ValueError as error:
-            reason = str(error).removeprefix(f"start.by = {setup.start.by!r}: ")
-            raise _Refused([Problem(("start", "by"), setup.start.by, reason)]) from error
+            field = "values" if setup.start.by == LOAD else "by"
+            reason = str(error).partition(": ")[2]
+            raise _Refused([Problem(("start", field), getattr(setup.start, field), reason)]) from error
         plain = json.loads(composition.model_dump_json())
         canonical = json.dumps(plain, sort_keys=True, separators=(",", ":"))
         digest = hashlib.sha256(canonical.encode()).hexdigest()[:DIGEST_LETTERS]

@@ -20,9 +20,10 @@ from nlsolve import Discretizer, SolveError, Status
 from nlsolve.driver import Budget, StoppingTest, solve
 from nlsolve.flow import Flow
 from nlsolve.ledger import Audited, Ledger
-from nlsolve.march import Start, march
+from nlsolve.march import march
 from nlsolve.series import Array
 from nlsolve.small import SmallProblem
+from nlsolve.start import Start
 from nlsolve.tangent import Tangent
 from nlsolve.testing import check_solver
 

@@ -18,7 +18,7 @@ PLUGINS = HOUSE.parent / "plugins"
 FLOORS = [
     "series component status columns",
     "laws scenes discretizers linear problems predictors globalization solvers",
-    "flow tangent pressure motion march measures audit ledger driver",
+    "flow tangent pressure motion start march measures audit ledger driver",
     "hookspecs registry nested",
     "studies locate errors outcomes condense sweeps runner store tables papers report plan diagnose figures",
     "testing small cli progress __init__",

@@ -20,7 +20,8 @@ from nlsolve_scenes.rings import Rings
 from nlsolve import Cloud, Operators, SolveError, Status
 from nlsolve.columns import FIELDS, RUNS, STEPS
 from nlsolve.driver import Budget, StoppingTest
-from nlsolve.march import Progress, Record, Start, march
+from nlsolve.march import Progress, Record, march
+from nlsolve.start import Start
 
 COARSE = Rings(spacing=0.5)
 DT = 1e-4
