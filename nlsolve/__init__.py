@@ -4,9 +4,12 @@ from importlib.metadata import PackageNotFoundError, version
 
 from nlsolve.component import Component
 from nlsolve.discretizers import Discretizer, Operators
+from nlsolve.globalization import Globalization, Search
 from nlsolve.hookspecs import hookimpl
 from nlsolve.laws import ConstitutiveLaw, PowerForm, local_index, stress
 from nlsolve.linear import Factors, LinearSolver
+from nlsolve.nested import Globalized
+from nlsolve.predictors import Predictor
 from nlsolve.problems import Expansion, NonlinearProblem
 from nlsolve.runner import Results, run
 from nlsolve.scenes import Cloud, Exact, Scene
@@ -29,15 +32,19 @@ __all__ = [
     "Exact",
     "Expansion",
     "Factors",
+    "Globalization",
+    "Globalized",
     "KeptTangent",
     "LinearSolver",
     "NonlinearProblem",
     "NonlinearSolver",
     "Operators",
     "PowerForm",
+    "Predictor",
     "RefreshRule",
     "Results",
     "Scene",
+    "Search",
     "Series",
     "SolveError",
     "Status",

@@ -9,7 +9,9 @@ from typing import Any, get_args
 
 from pydantic import BaseModel, ValidationError
 
+from nlsolve.component import Component
 from nlsolve.locate import Place, nearest_line
+from nlsolve.registry import CONTRACTS, load_registry
 
 LONGEST_VALUE = 60
 """Characters of an offending value that are worth repeating."""
@@ -169,7 +171,9 @@ def _chosen(candidates: list[type[BaseModel]], document: Any) -> type[BaseModel]
 
 
 def _models_in(annotation: Any) -> list[type[BaseModel]]:
-    """The models mentioned in a type: Annotated[A | B, …], list[A], …"""
+    """The models mentioned in a type: Annotated[A | B, …], list[A], …; of a contract, those that are installed."""
+    if isinstance(annotation, type) and issubclass(annotation, Component) and annotation in CONTRACTS.values():
+        return list(load_registry().classes(annotation.noun).values())
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         return [annotation]
     inner = getattr(annotation, "__value__", None)

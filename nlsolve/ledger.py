@@ -69,6 +69,21 @@ class SealedMatrix:
         heavier = sp.diags_array(shift * np.abs(contents.matrix.diagonal()))
         return _seal(contents.matrix + heavier, contents.ledger)
 
+    def augmented(self, shift: float) -> SealedMatrix:
+        """(I, A; Aᵀ/α, −shift D/α) of shape (2 U, 2 U), sealed like A, with D = diag(‖A e_j‖²), α = min_j ‖A e_j‖.
+
+        (I, A; Aᵀ/α, −shift D/α) (r; w) = (b; 0) has w = argmin ‖b − A w‖² + shift ‖D^½ w‖² and r = b − A w: the normal
+        equations without AᵀA, whose condition is the square of A's (Björck 1996, 1.6). α makes rows of one size.
+        """
+        contents = _contents[self]
+        columns = sp.linalg.norm(contents.matrix, axis=0)
+        alpha = float(columns.min()) or 1.0
+        rows = [
+            [sp.eye_array(self.shape[0]), contents.matrix],
+            [contents.matrix.T / alpha, -sp.diags_array(shift * columns**2 / alpha)],
+        ]
+        return _seal(sp.block_array(rows, format="csr"), contents.ledger)
+
 
 class _Contents:
     """What is inside one sealed matrix."""

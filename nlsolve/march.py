@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 import pandas as pd
-from pydantic import Field
 from scipy.spatial import cKDTree
 
 from nlsolve.audit import audit
 from nlsolve.columns import STEPS
-from nlsolve.component import Component
 from nlsolve.discretizers import Discretizer, Operators
 from nlsolve.driver import Budget, Outcome, StoppingTest, solve
 from nlsolve.estimate import discretization_error
@@ -24,28 +21,14 @@ from nlsolve.ledger import Ledger
 from nlsolve.linear import LinearSolver
 from nlsolve.measures import divergence, nodal_fields, velocity_error, wall_reaction
 from nlsolve.motion import Markers, MovingNodes
+from nlsolve.predictors import Predictor
 from nlsolve.pressure import Mixing
 from nlsolve.scenes import Scene
 from nlsolve.series import Array
 from nlsolve.solvers import NonlinearSolver, RefreshRule
+from nlsolve.start import Stage, Start, walk
 from nlsolve.status import SolveError, Status
 from nlsolve.tangent import Tangent
-
-
-class Start(Component):
-    """How the first state is reached from rest, where no series and no Newton step has a useful range: continuation.
-
-    The law is solved with its field `by` at each of `values` larger than the target, then at the target, by the
-    starting method with a new tangent each iteration. The work is counted apart from the march (columns `start_…`).
-    """
-
-    noun: ClassVar[str] = "start"
-
-    by: str = Field(
-        "index", description="field of the law that is varied: index (from 1) or regularization (from large)"
-    )
-    values: tuple[float, ...] = Field((1.0, 0.5, 0.3, 0.2), description="its values on the way, in order")
-    tolerance: float = Field(1e-10, gt=0, description="relative residual of the first state")
 
 
 @dataclass(frozen=True)
@@ -59,6 +42,7 @@ class Setup:
     solver: NonlinearSolver
     refresh: RefreshRule
     starter: NonlinearSolver
+    predictor: Predictor
     stop: StoppingTest = field(default_factory=StoppingTest)
     start: Start = field(default_factory=Start)
     budget: Budget = field(default_factory=Budget)
@@ -100,7 +84,6 @@ class _March:
         self.start_ledger, self.ledger = Ledger(), Ledger()
         self.start_tangent = Tangent(setup.linear, None, self.start_ledger)
         self.tangent = Tangent(setup.linear, setup.refresh, self.ledger)
-        self.seconds_start = 0.0
         self.volumetric = bool(self.scene.penalty)
         self.rows: list[dict[str, Any]] = []
         self.snapshots: list[pd.DataFrame] = []
@@ -146,7 +129,8 @@ class _March:
         if self.scene.motion_of_nodes == "lagrangian":
             self.moving = MovingNodes(self.scene, self.setup.discretizer, self.initial)
         self.build_operators()
-        self.velocity = np.zeros_like(self.cloud.nodes)
+        self.velocity = self.guess = np.zeros_like(self.cloud.nodes)
+        self.past: list[Array] = []  # velocities of the same nodes at the ends of the increments, latest first
         self.before: Array | None = None  # velocity one increment earlier
         probe = self.scene.probe
         inside = self.cloud.interior
@@ -155,44 +139,47 @@ class _March:
         )
 
     def first_state(self) -> Outcome:
-        """Quasi-static state at t = 0 by continuation of the law; a steady scene's last stage is the case's own."""
-        *easier, target = self.setup.law.continuation(self.setup.start.by, self.setup.start.values)
-        begun = time.process_time()
-        outcome, law = None, target
-        for law in easier:
-            outcome = self.start_stage(law)
-            if outcome.status is not Status.CONVERGED:
-                break
-        if self.scene.increments and (outcome is None or outcome.status is Status.CONVERGED):
-            law = target
-            outcome = self.iterate_pressure(lambda: self.start_stage(target))
-        self.seconds_start = time.process_time() - begun
-        self.tangent = Tangent(self.setup.linear, self.setup.refresh, self.ledger, self.start_tangent.factors)
-        if outcome is not None and outcome.status is not Status.CONVERGED:
-            by = self.setup.start.by
-            detail = f"on the way to the first state, at {by} = {getattr(law, by):g}: {outcome.detail}"
-            return Outcome(outcome.status, detail, outcome.state, outcome.residual_norm, ())
-        if self.scene.increments == 0:
-            outcome = self.iterate_pressure(lambda: self.solve_increment(0, self.flow_of(target)))
-        assert outcome is not None
+        """Quasi-static state at t = 0 by continuation; a steady scene's last stage is the case's own."""
+        steady, start = not self.scene.increments, self.setup.start
+
+        def solve_stage(stage: Stage, last: bool) -> Outcome:
+            if not last:
+                return self.start_stage(stage)
+            if not steady:
+                return self.iterate_pressure(lambda: self.start_stage(stage))
+            self.take_over()
+            return self.iterate_pressure(lambda: self.solve_increment(0, self.flow_of(stage.law)))
+
+        outcome, stage = walk(start, self.setup.law, solve_stage)
+        self.take_over()
         if outcome.status is Status.CONVERGED:
             if self.scene.markers or self.scene.shifting:
                 self.markers = Markers(self.scene, self.setup.discretizer, self.initial, self.velocity)
             self.record_fields_if_due()
+        elif not (steady and self.tangent.branches):
+            detail = f"on the way to the first state, at {start.by} = {stage.value:g}: {outcome.detail}"
+            return Outcome(outcome.status, detail, outcome.state, outcome.residual_norm, ())
         return outcome
 
-    def start_stage(self, law: ConstitutiveLaw) -> Outcome:
+    def take_over(self) -> None:
+        """The case's own tangent, in the ordering that the start settled on, unless it is there already."""
+        if not self.tangent.branches:
+            self.tangent = Tangent(self.setup.linear, self.setup.refresh, self.ledger, self.start_tangent.factors)
+
+    def start_stage(self, stage: Stage) -> Outcome:
+        """The starting method on one stage; a state it converges to is kept."""
         setup = self.setup
-        flow = self.flow_of(law)
-        outcome = solve(
-            flow,
-            setup.starter,
-            self.start_tangent,
-            flow.unknowns(self.velocity),
-            StoppingTest(kind="residual", tolerance=setup.start.tolerance),
-            setup.budget,
-            self.start_ledger,
-        )
+        with self.start_ledger.entry("stage"):
+            flow = self.flow_of(stage.law, load=stage.load)
+            outcome = solve(
+                flow,
+                setup.starter,
+                self.start_tangent,
+                flow.unknowns(self.guess),
+                StoppingTest(kind="residual", tolerance=setup.start.tolerance),
+                setup.start.budget(setup.budget),
+                self.start_ledger,
+            )
         self.blame = outcome.blame
         if outcome.status is Status.CONVERGED:
             self.keep(flow, outcome.state)
@@ -204,6 +191,8 @@ class _March:
         if self.moving is not None:
             self.move_nodes(self.moving)
         previous = self.velocity
+        self.past = [previous, *self.past][: self.setup.predictor.depth]
+        self.guess = self.setup.predictor.guess(self.past)
         inertia = self.inertia_from(previous)
         outcome = self.iterate_pressure(lambda: self.solve_increment(k, self.flow_of(self.setup.law, inertia)))
         if outcome.status is Status.CONVERGED:
@@ -225,6 +214,7 @@ class _March:
         self.build_operators()
         if carry is not None:
             self.velocity = self.velocity + carry @ self.velocity
+            self.past = [velocity + carry @ velocity for velocity in self.past]
 
     def build_operators(self) -> None:
         before = self.operators if self.pressure is not None else None
@@ -237,22 +227,29 @@ class _March:
         if before is not None:
             self.pressure = self.between_volume_points(before, self.operators) @ self.pressure
 
-    def flow_of(self, law: ConstitutiveLaw, inertia: Inertia | None = None, others: Operators | None = None) -> Flow:
+    def flow_of(
+        self,
+        law: ConstitutiveLaw,
+        inertia: Inertia | None = None,
+        load: float = 1.0,
+        others: Operators | None = None,
+    ) -> Flow:
         """The balance now, by the operators of the march or by `others` of the same cloud."""
         operators = others or self.operators
         pressure = self.pressure
         if others is not None and pressure is not None:
             pressure = self.between_volume_points(self.operators, others) @ pressure
+        body_force = self.scene.body_force(self.cloud.nodes[self.cloud.interior], law)
         return Flow(
             self.cloud,
             operators,
             law,
-            self.scene.boundary_velocity(self.cloud, law, self.time),
+            load * self.scene.boundary_velocity(self.cloud, law, self.time),
             self.scene.penalty_modulus(law, self.rate_squared_at_volume_points(operators)) if self.volumetric else 0.0,
             pressure,
             inertia,
             Convection(self.scene.density, self.gradient) if self.gradient is not None else None,
-            self.scene.body_force(self.cloud.nodes[self.cloud.interior], law),
+            None if body_force is None else load * body_force,
         )
 
     def rate_squared_at_volume_points(self, operators: Operators) -> Array:
@@ -296,7 +293,7 @@ class _March:
         """The case's own method on one increment; its rows, counts and largest residual are kept."""
         setup = self.setup
         outcome = solve(
-            flow, setup.solver, self.tangent, flow.unknowns(self.velocity), setup.stop, setup.budget, self.ledger
+            flow, setup.solver, self.tangent, flow.unknowns(self.guess), setup.stop, setup.budget, self.ledger
         )
         solved = outcome.status is Status.CONVERGED
         self.iterations += max(0, len(outcome.steps) - 1)
@@ -306,7 +303,8 @@ class _March:
         self.rows += [{"increment": k, "time": self.time, "accepted": False, **row} for row in outcome.steps]
         if self.validity_time is None and self.scene.increments and self.tangent.branches > 1:
             self.validity_time = (k - 1) * self.scene.increment
-        self.residual_norm = float(np.fmax(self.residual_norm, outcome.residual_norm))
+        before = self.residual_norm if k else np.nan  # of a steady scene the last solve counts: a start may repeat it
+        self.residual_norm = float(np.fmax(before, outcome.residual_norm))
         if solved:
             self.keep(flow, outcome.state)
             self.increments = max(k, 1)
@@ -329,14 +327,14 @@ class _March:
     def keep(self, flow: Flow, unknowns: Array) -> None:
         """A solved state: what is measured, and where the next solve begins."""
         self.flow, self.unknowns = flow, unknowns
-        self.velocity = flow.velocity(unknowns)
+        self.velocity = self.guess = flow.velocity(unknowns)
 
     def error_estimate(self, velocity: Array) -> float:
         """By the counterpart, of the last increment; NaN without one."""
         if self.setup.counterpart is None:
             return float("nan")
         others = self.setup.counterpart.operators(self.cloud, self.volumetric)
-        flow = self.flow_of(self.setup.law, self.inertia_from(self.before), others)
+        flow = self.flow_of(self.setup.law, self.inertia_from(self.before), others=others)
         return discretization_error(flow, velocity, self.setup.linear)
 
     # What is left behind.
@@ -391,8 +389,8 @@ class _March:
             "seconds_residual": ledger.seconds["residual"],
             "seconds_series": ledger.seconds["series_order"],
             "seconds_operators": ledger.seconds["operators"],
-            "seconds_start": self.seconds_start,
-            "seconds_all": ledger.seconds["method"] + ledger.seconds["operators"] + self.seconds_start,
+            "seconds_start": start.seconds["stage"],
+            "seconds_all": ledger.seconds["method"] + ledger.seconds["operators"] + start.seconds["stage"],
             "ordering": factors.ordering if factors else None,
             "fill": factors.fill if factors else None,
             "factor_solve_ratio": ledger.each("factorization") / ledger.each("triangular_solve"),

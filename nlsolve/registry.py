@@ -22,14 +22,25 @@ from pydantic_core import PydanticCustomError, to_jsonable_python
 from nlsolve import hookspecs
 from nlsolve.component import Component
 from nlsolve.discretizers import Discretizer
+from nlsolve.globalization import Globalization
 from nlsolve.laws import ConstitutiveLaw
 from nlsolve.linear import LinearSolver
+from nlsolve.predictors import Predictor
 from nlsolve.scenes import Scene
 from nlsolve.solvers import NonlinearSolver, RefreshRule
 
 CONTRACTS: dict[str, type[Component]] = {
     contract.noun: contract
-    for contract in (Scene, ConstitutiveLaw, Discretizer, LinearSolver, NonlinearSolver, RefreshRule)
+    for contract in (
+        Scene,
+        ConstitutiveLaw,
+        Discretizer,
+        LinearSolver,
+        NonlinearSolver,
+        RefreshRule,
+        Predictor,
+        Globalization,
+    )
 }
 """What a plugin may offer, by noun, in the order of a study file."""
 
@@ -132,21 +143,25 @@ class Registry:
         failed = f"; {len(self._failures)} plugin(s) failed, see `nlsolve plugins`" if self._failures else ""
         return f"no such {noun}; {guess}installed: {', '.join(classes) or 'none'}{failed}"
 
+    def known(self, noun: str, value: object) -> object:
+        """A component, or a table with an installed kind, as it is; PydanticCustomError for anything else."""
+        if isinstance(value, Component):
+            return value
+        if not isinstance(value, Mapping):
+            raise PydanticCustomError("table_expected", 'should be a table with a kind, like { kind = "…" }')
+        if "kind" not in value:
+            kinds = ", ".join(self.classes(noun)) or "none"
+            raise PydanticCustomError("kind_missing", "required, and missing; installed: {kinds}", {"kinds": kinds})
+        complaint = self.complaint(noun, value["kind"])
+        if complaint is not None:
+            raise PydanticCustomError("kind_unknown", "{complaint}", {"complaint": complaint})
+        return value
+
     def union(self, noun: str) -> Any:
         """The pydantic type of a section: one of the installed classes, discriminated on `kind`."""
 
         def known(value: object) -> object:
-            if isinstance(value, Component):
-                return value
-            if not isinstance(value, Mapping):
-                raise PydanticCustomError("table_expected", 'should be a table with a kind, like { kind = "…" }')
-            if "kind" not in value:
-                kinds = ", ".join(self.classes(noun)) or "none"
-                raise PydanticCustomError("kind_missing", "required, and missing; installed: {kinds}", {"kinds": kinds})
-            complaint = self.complaint(noun, value["kind"])
-            if complaint is not None:
-                raise PydanticCustomError("kind_unknown", "{complaint}", {"complaint": complaint})
-            return value
+            return self.known(noun, value)
 
         members = tuple(self.classes(noun).values())
         if len(members) > 1:

@@ -19,17 +19,18 @@ from nlsolve.driver import Budget, StoppingTest
 from nlsolve.errors import ABSENT, Problem, Source, StudyError, did_you_mean, problems_in
 from nlsolve.figures import FigureSpec
 from nlsolve.locate import Place, lines_of
-from nlsolve.march import Setup, Start
+from nlsolve.march import Setup
 from nlsolve.outcomes import VARIANT
 from nlsolve.references import REFERENCE
 from nlsolve.registry import CONTRACTS, Registry, load_registry
+from nlsolve.start import LOAD, Start
 from nlsolve.sweeps import Document, Point, Setting, Sweep, assign_all, leaves, merged, places_of, swept_places
 from nlsolve.tables import TableSpec, check
 
 SECTIONS = tuple(field.name for field in fields(Setup))
 """The parts of a study that a case is made of, and that can be swept."""
 
-DEFAULT_KINDS = {"linear": {"kind": "superlu"}, "starter": {"kind": "newton"}}
+DEFAULT_KINDS = {"linear": {"kind": "superlu"}, "starter": {"kind": "newton"}, "predictor": {"kind": "previous"}}
 """Sections that may be left out, or written without a kind."""
 
 DEFAULTS_OF_KINDS = {"solver": "refresh", "discretizer": "counterpart"}
@@ -143,7 +144,7 @@ class _Builder:
         self.overrides = {**quick_values, **overrides}
         self.source = Source(source.file, source.lines, aliases | {name: f"{source.file}, --set" for name in overrides})
         self.refuse(assign_all(self.document, self.overrides))
-        parts: dict[str, Any] = {noun: (registry.union(noun), ...) for noun in CONTRACTS} | {
+        parts: dict[str, Any] = {noun: (registry.union(noun), ...) for noun in CONTRACTS if noun in SECTIONS} | {
             "refresh": (registry.union("refresh"), None),  # absent only when there is no solver to ask for its default
             "starter": (registry.union("solver"), ...),
             "counterpart": (registry.union("discretizer"), None),
@@ -307,15 +308,16 @@ class _Builder:
             sentence = f"the solver {setup.solver.kind_name()!r} never claims a solution; use residual or difference"
             raise _Invalid([Problem(("stop", "kind"), "claim", sentence)])
         try:
-            setup.law.continuation(setup.start.by, setup.start.values)
+            setup.start.stages(setup.law)
         except ValidationError as error:
             reasons = "; ".join(detail["msg"] for detail in error.errors())
             raise _Invalid(
                 [Problem(("start", "values"), list(setup.start.values), f"refused by the law: {reasons}")]
             ) from error
         except ValueError as error:
-            reason = str(error).removeprefix(f"start.by = {setup.start.by!r}: ")
-            raise _Invalid([Problem(("start", "by"), setup.start.by, reason)]) from error
+            field = "values" if setup.start.by == LOAD else "by"
+            reason = str(error).partition(": ")[2]
+            raise _Invalid([Problem(("start", field), getattr(setup.start, field), reason)]) from error
         plain = json.loads(composition.model_dump_json())
         canonical = json.dumps(plain, sort_keys=True, separators=(",", ":"))
         digest = hashlib.sha256(canonical.encode()).hexdigest()[:DIGEST_LETTERS]

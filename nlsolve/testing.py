@@ -18,9 +18,11 @@ import scipy.sparse as sp
 from nlsolve.discretizers import Discretizer, Operators
 from nlsolve.driver import Budget, StoppingTest, solve
 from nlsolve.flow import node_major
+from nlsolve.globalization import Globalization
 from nlsolve.laws import CONTRACTION, ConstitutiveLaw
 from nlsolve.ledger import Ledger
 from nlsolve.linear import LinearSolver
+from nlsolve.predictors import Predictor
 from nlsolve.problems import NonlinearProblem
 from nlsolve.scenes import Cloud, Scene
 from nlsolve.series import Array, Series
@@ -245,6 +247,48 @@ def check_refresh_rule(rule: RefreshRule) -> None:
             first, again = rule.due(evidence), rule.due(evidence)
             _require(isinstance(first, (bool, np.bool_)), f"due({evidence}) is {first!r}, not True or False")
             _require(first == again, f"due({evidence}) changed its mind: a rule may look at the evidence only")
+
+
+def check_globalization(globalization: Globalization) -> None:
+    """On a small problem with a potential: a positive length, the residual of the state it leads to, nothing changed in
+    what was handed over; near the solution Newton's full step; no memory from one solve to the next.
+    """
+    problem = SmallProblem()
+    problem.is_gradient = True  # A is symmetric
+
+    def first(far: float) -> float:
+        state = SmallProblem.solution + far * np.cos(np.arange(12.0))
+        residual = problem.residual(state)
+        direction = -np.linalg.solve(problem.jacobian(state).toarray(), residual)
+        given = [state.copy(), residual.copy(), direction.copy()]
+        length, found = globalization.search(problem).length(problem, state, residual, direction)
+        _require(length > 0.0, f"a step length of {length}")
+        expected = problem.residual(state + length * direction)
+        _same(found, expected, _size(expected), "the residual at the end of the step")
+        unchanged = all(map(np.array_equal, given, (state, residual, direction)))
+        _require(unchanged, "the search changed the state, the residual or the direction it was given")
+        return length
+
+    _require(first(0.01) == 1.0, "a full step of Newton near the solution was not taken")
+    for far in (0.5, 5.0):
+        _require(
+            first(far) == first(far), "the first length of a second solve is another: what is kept is of one solve"
+        )
+
+
+def check_predictor(predictor: Predictor) -> None:
+    """A flow that stays as it is goes on as it is, to 1e-12, however few increments are known; a guess has the shape of
+    the velocities, leaves them as they were, and is the same each time.
+    """
+    _require(predictor.depth >= 1, f"a depth of {predictor.depth}: at least the last increment is looked at")
+    steady = np.random.default_rng(0).standard_normal((7, 2))
+    for known in range(1, predictor.depth + 1):
+        past = [steady.copy() for _ in range(known)]
+        guess = predictor.guess(past)
+        _require(guess.shape == steady.shape, f"a guess of shape {guess.shape} for velocities of {steady.shape}")
+        _same(guess, steady, 1.0, f"the guess of a steady flow from {known} increments", 1e-12)
+        _require(all(np.array_equal(v, steady) for v in past), "the predictor changed the velocities it looked at")
+        _require(np.array_equal(predictor.guess(past), guess), "guess changed its mind: it may look at the past only")
 
 
 def check_solver(solver: NonlinearSolver, rule: RefreshRule | None = None) -> None:

@@ -7,6 +7,7 @@ from typing import Any
 from nlsolve_collocation import MovingLeastSquares
 from nlsolve_laws import PowerLaw
 from nlsolve_newton import Newton
+from nlsolve_predictors import Previous
 from nlsolve_refresh import EveryIteration
 from nlsolve_scenes import StirringTool
 from nlsolve_scenes.rings import Rings
@@ -64,6 +65,7 @@ def setup(scene: Scene, index: float = 0.5, **parts: Any) -> Setup:
         "solver": Newton(),
         "refresh": EveryIteration(),
         "starter": Newton(),
+        "predictor": Previous(),
         "stop": StoppingTest(tolerance=1e-10),
     }
     return Setup(scene=scene, **(given | parts))

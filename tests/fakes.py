@@ -21,6 +21,7 @@ from nlsolve import (
     LinearSolver,
     NonlinearSolver,
     Operators,
+    Predictor,
     RefreshRule,
     Scene,
     Step,
@@ -146,7 +147,20 @@ class EveryM(RefreshRule):
         return evidence.uses >= self.m
 
 
-COMPONENTS = (Box, Honey, Grid, Dense, Newton, Homotopy, EveryIteration, EveryM)
+class Previous(Predictor):
+    """The default predictor."""
+
+    kind: Literal["previous"] = "previous"
+
+    @property
+    def depth(self) -> int:
+        return 1
+
+    def guess(self, past: Any) -> Any:
+        return past[0]
+
+
+COMPONENTS = (Box, Honey, Grid, Dense, Newton, Homotopy, EveryIteration, EveryM, Previous)
 
 
 class Plugin:

@@ -21,8 +21,9 @@ from scipy.integrate import trapezoid
 from scipy.spatial import Delaunay, Voronoi, cKDTree
 
 from nlsolve import Cloud, ConstitutiveLaw, Scene, SolveError, Status
-from nlsolve.march import Start, march
+from nlsolve.march import march
 from nlsolve.series import Array
+from nlsolve.start import Start
 from nlsolve.testing import check_scene
 
 LAW = PowerLaw()

@@ -16,8 +16,9 @@ from scipy.integrate import quad
 
 from nlsolve import ConstitutiveLaw, Exact, Scene
 from nlsolve.laws import stress
-from nlsolve.march import Start, march
+from nlsolve.march import march
 from nlsolve.series import Array
+from nlsolve.start import Start
 from nlsolve.testing import check_scene
 
 LAWS: dict[str, ConstitutiveLaw] = {

@@ -127,7 +127,9 @@ def test_diverged() -> None:
 def test_full_newton_steps_diverge_where_damped_ones_converge() -> None:
     """u/√(1 + u²) from beyond 1: u ← −u³, the textbook divergence."""
     problem = Scalar(lambda u: u / np.sqrt(1.0 + u * u))
-    full, _ = run(problem, Newton(halvings=0), EveryIteration(), np.array([1.2]), DenseLU(), iterations=5)
+    full, _ = run(
+        problem, Newton(globalization={"kind": "none"}), EveryIteration(), np.array([1.2]), DenseLU(), iterations=5
+    )
     damped, _ = run(problem, Newton(), EveryIteration(), np.array([1.2]), DenseLU(), iterations=20)
     assert full.status is Status.BUDGET_SPENT
     assert abs(full.state[0]) > 1e6

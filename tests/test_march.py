@@ -20,7 +20,8 @@ from nlsolve_scenes.rings import Rings
 from nlsolve import Cloud, Operators, SolveError, Status
 from nlsolve.columns import FIELDS, RUNS, STEPS
 from nlsolve.driver import Budget, StoppingTest
-from nlsolve.march import Progress, Record, Start, march
+from nlsolve.march import Progress, Record, march
+from nlsolve.start import Start
 
 COARSE = Rings(spacing=0.5)
 DT = 1e-4
@@ -260,7 +261,14 @@ def test_an_increment_that_does_not_converge_ends_the_march_with_its_rows() -> N
     """A budget of one chord iteration is too little once the nodes have moved."""
     stop = StoppingTest(tolerance=1e-10)
     record = march(
-        setup(marching(5), 0.3, stop=stop, budget=Budget(iterations=60), refresh=Never(), solver=Newton(halvings=0))
+        setup(
+            marching(5),
+            0.3,
+            stop=stop,
+            budget=Budget(iterations=60),
+            refresh=Never(),
+            solver=Newton(globalization={"kind": "none"}),
+        )
     )
     assert record.summary["status"] == "converged"
     short = march(setup(marching(5), 0.3, stop=stop, start=Start(tolerance=1e-2), budget=Budget(iterations=2)))

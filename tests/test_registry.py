@@ -58,7 +58,16 @@ def test_classes_by_noun_and_kind():
     assert registry.classes("solver") == {"anm": Homotopy, "newton": Newton}
     assert registry.classes("law") == {"honey": Honey}
     assert registry.classes("nothing") == {}
-    assert set(CONTRACTS) == {"scene", "law", "discretizer", "linear", "solver", "refresh"}
+    assert set(CONTRACTS) == {
+        "scene",
+        "law",
+        "discretizer",
+        "linear",
+        "solver",
+        "refresh",
+        "predictor",
+        "globalization",
+    }
 
 
 def test_rows_tell_source_and_parameters():

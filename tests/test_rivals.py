@@ -1,4 +1,4 @@
-"""Anderson, Broyden, Picard, Newton-Krylov, their line searches, and SciPy's methods under the same ledger."""
+"""Anderson, Broyden, Picard, Newton-Krylov, and SciPy's methods under the same ledger."""
 
 from __future__ import annotations
 
@@ -12,23 +12,24 @@ from cases import PLAIN, near, run, spin_flow
 from nlsolve_collocation import MovingLeastSquares
 from nlsolve_fixed_point import Anderson, Broyden, Picard
 from nlsolve_fixed_point.mixing import Mixing
+from nlsolve_globalization import Backtracking, Cubic, FullSteps, NonMonotone
 from nlsolve_krylov import NewtonKrylov, TrustRegion
 from nlsolve_krylov.forcing import next_forcing
 from nlsolve_krylov.gmres import gmres
 from nlsolve_krylov.trust_region import cauchy_point, dogleg
 from nlsolve_laws import PowerLaw
-from nlsolve_newton import ModifiedNewton, Newton, PseudoTransient
-from nlsolve_newton.line_search import LeastResidual
+from nlsolve_newton import LevenbergMarquardt, ModifiedNewton, Newton, PseudoTransient
 from nlsolve_peers import ScipyRoot
 from nlsolve_refresh import CostOptimal, EveryIteration, Never, PoorContraction
 from nlsolve_scenes import StirringTool
 from nlsolve_scenes.rings import Rings
 from pydantic import ValidationError
+from scipy.sparse import csr_array
 
 from nlsolve import Evidence, NonlinearProblem, NonlinearSolver, RefreshRule, SolveError, Status
 from nlsolve.driver import StoppingTest
 from nlsolve.flow import Convection, Flow
-from nlsolve.ledger import Audited, Ledger
+from nlsolve.ledger import Audited, Ledger, factorize_counted
 from nlsolve.small import DenseLU, SmallProblem
 from nlsolve.tangent import Tangent
 from nlsolve.testing import check_refresh_rule, check_solver
@@ -47,14 +48,20 @@ SOLVERS: tuple[NonlinearSolver, ...] = (
     NewtonKrylov(),
     NewtonKrylov(products="jacobian"),
     NewtonKrylov(forcing="linear-model"),
-    NewtonKrylov(forcing="constant", halvings=0),
+    NewtonKrylov(forcing="constant", globalization=FullSteps()),
     NewtonKrylov(dimension=2),
-    Newton(line_search="parabola"),
-    Newton(line_search="non-monotone"),
-    ModifiedNewton(line_search="non-monotone"),
+    NewtonKrylov(globalization=Cubic()),
+    Newton(globalization=Cubic()),
+    Newton(globalization=NonMonotone()),
+    ModifiedNewton(globalization=NonMonotone()),
+    Anderson(globalization=Backtracking()),
+    Picard(globalization=Cubic()),
+    Broyden(globalization=Backtracking()),
     TrustRegion(),
     PseudoTransient(),
     PseudoTransient(shift=1e-3),
+    LevenbergMarquardt(),
+    LevenbergMarquardt(shift=1.0),
     *(ScipyRoot(method=method) for method in METHODS),
 )
 
@@ -115,7 +122,7 @@ def test_anderson_on_a_linear_problem_is_gmres(k: int) -> None:
 def test_without_depth_anderson_is_modified_newton() -> None:
     flow = spin_flow(0.5)
     np.testing.assert_array_equal(
-        iterates(flow, Anderson(depth=0), flow, 4), iterates(flow, ModifiedNewton(halvings=0), flow, 4)
+        iterates(flow, Anderson(depth=0), flow, 4), iterates(flow, ModifiedNewton(globalization=FullSteps()), flow, 4)
     )
 
 
@@ -289,43 +296,6 @@ def test_picard_says_when_there_is_no_secant_matrix() -> None:
     assert outcome.detail.startswith("Bare has no secant matrix A(u) with R(u) = A(u) u + c(u)")
 
 
-# Line searches.
-
-
-class Scripted(SmallProblem):
-    """‖R(u + t w)‖ as written down, in order of asking."""
-
-    def __init__(self, *sizes: float) -> None:
-        self.sizes = list(sizes)
-
-    def residual(self, u: Any) -> Any:
-        return np.array([self.sizes.pop(0)])
-
-
-def test_a_non_monotone_search_bears_growth_up_to_the_largest_of_its_memory() -> None:
-    state, w = np.zeros(1), np.ones(1)
-    for memory, expected in ((1, 0.5), (10, 1.0)):
-        search = LeastResidual(halvings=10, memory=memory, interpolate=False)
-        search.length(Scripted(1.0), state, np.array([2.0]), w)
-        length, residual = search.length(Scripted(1.5, 0.9), state, np.array([1.0]), w)
-        assert length == expected
-        assert residual[0] == {1: 0.9, 10: 1.5}[memory]
-
-
-def test_the_parabola_search_goes_to_the_least_point_of_the_parabola() -> None:
-    """‖R‖² = 1 − 2 t + 5 t² through ‖R(1)‖ = 2: least at t = 0.2; and no shorter than a tenth at once."""
-    search = LeastResidual(halvings=10, memory=1, interpolate=True)
-    for first, expected in ((2.0, 0.2), (100.0, 0.1), (1.001, 0.4995)):
-        length, _ = search.length(Scripted(first, 0.5), np.zeros(1), np.array([1.0]), np.ones(1))
-        assert length == pytest.approx(expected, rel=1e-3)
-
-
-def test_a_search_that_finds_no_decrease_takes_the_smallest_residual() -> None:
-    search = LeastResidual(halvings=2, memory=1, interpolate=False)
-    length, residual = search.length(Scripted(3.0, 1.5, 2.0), np.zeros(1), np.array([1.0]), np.ones(1))
-    assert (length, residual[0]) == (0.5, 1.5)
-
-
 # Pseudo-transient continuation.
 
 
@@ -351,6 +321,73 @@ def test_pseudo_transient_ends_quadratically() -> None:
     assert order([row["residual_norm"] for row in outcome.steps]) > 1.6
 
 
+# Levenberg-Marquardt.
+
+
+@pytest.mark.parametrize("shift", [0.0, 1e-3, 10.0])
+def test_the_augmented_matrix_solves_the_damped_least_squares(shift: float) -> None:
+    """w of (JᵀJ + μ D) w = Jᵀ b and r = b − J w, by QR of J over (μ D)^½; columns of very different size."""
+    matrix = np.random.default_rng(0).standard_normal((12, 12)) * 10.0 ** np.linspace(-3.0, 3.0, 12)
+    b = np.cos(np.arange(12.0))
+
+    class Linear(SmallProblem):
+        def jacobian(self, u: Any) -> Any:
+            return csr_array(matrix)
+
+    ledger = Ledger()
+    augmented = Audited(Linear(), ledger).view.jacobian(b).augmented(shift)
+    factors = factorize_counted(DenseLU(), augmented, None, ledger)
+    r, w = np.split(factors.solve(np.concatenate([b, np.zeros(12)])), 2)
+    damping = np.diag(np.sqrt(shift) * np.linalg.norm(matrix, axis=0))
+    expected = np.linalg.lstsq(np.vstack([matrix, damping]), np.concatenate([b, np.zeros(12)]))[0]
+    np.testing.assert_allclose(w, expected, rtol=1e-8)
+    np.testing.assert_allclose(r, b - matrix @ expected, atol=1e-9)
+    assert ledger.counts["factorization"] == ledger.counts["jacobian"] == 1
+
+
+def test_levenberg_marquardts_first_step_solves_the_damped_normal_equations() -> None:
+    problem = SmallProblem()
+    outcome, _ = run(problem, LevenbergMarquardt(shift=0.5), EveryIteration(), START, DenseLU(), iterations=1)
+    matrix, residual = problem.jacobian(START).toarray(), problem.residual(START)
+    normal = matrix.T @ matrix + 0.5 * np.diag((matrix**2).sum(axis=0))
+    np.testing.assert_allclose(outcome.state - START, -np.linalg.solve(normal, matrix.T @ residual), rtol=1e-9)
+
+
+def test_the_residual_falls_at_each_step_of_levenberg_and_marquardt_from_afar() -> None:
+    """And a refused step costs a matrix and a residual, and no row."""
+    far = SmallProblem.solution + 8.0 * np.cos(np.arange(12.0))
+    outcome, ledger = run(SmallProblem(), LevenbergMarquardt(), EveryIteration(), far, DenseLU())
+    assert outcome.status is Status.CONVERGED
+    assert (np.diff([row["residual_norm"] for row in outcome.steps]) < 0.0).all()
+    assert ledger.counts["factorization"] == ledger.counts["residual"] - 1 >= len(outcome.steps) - 1
+
+
+def test_a_step_is_refused_until_it_is_short_enough() -> None:
+    """F = arctan u from u = 3, where a full step ends at −9.5: ‖F‖ falls at once when enough is damped."""
+
+    class Arctan(SmallProblem):
+        def residual(self, u: Any) -> Any:
+            return np.arctan(u)
+
+        def jacobian(self, u: Any) -> Any:
+            return csr_array(np.diag(1.0 / (1.0 + u**2)))
+
+    outcome, ledger = run(Arctan(), LevenbergMarquardt(), EveryIteration(), np.full(2, 3.0), DenseLU())
+    assert outcome.status is Status.CONVERGED
+    assert ledger.counts["factorization"] > len(outcome.steps) - 1
+    assert (np.diff([row["residual_norm"] for row in outcome.steps]) < 0.0).all()
+    kept, ledger = run(Arctan(), LevenbergMarquardt(), Never(), np.full(2, 3.0), DenseLU())
+    assert kept.status is Status.STAGNATED
+    assert kept.detail == "a step was refused because ‖R‖ does not fall, and the refresh rule keeps its matrix"
+    assert ledger.counts["factorization"] == 1
+
+
+def test_a_damping_without_end_is_a_status() -> None:
+    outcome, _ = run(Constant(), LevenbergMarquardt(), EveryIteration(), START, DenseLU())
+    assert outcome.status is Status.STAGNATED
+    assert "with a damping of 3.6e+13" in outcome.detail
+
+
 # Trust region.
 
 
@@ -374,7 +411,9 @@ def test_the_cauchy_point_is_the_least_of_the_model_along_the_steepest_descent()
 def test_in_a_wide_region_the_trust_region_method_is_modified_newton() -> None:
     flow = spin_flow(0.5)
     np.testing.assert_allclose(
-        iterates(flow, TrustRegion(), flow, 4), iterates(flow, ModifiedNewton(halvings=0), flow, 4), rtol=1e-12
+        iterates(flow, TrustRegion(), flow, 4),
+        iterates(flow, ModifiedNewton(globalization=FullSteps()), flow, 4),
+        rtol=1e-12,
     )
 
 
@@ -445,7 +484,8 @@ def test_a_failure_inside_scipy_is_a_status() -> None:
         (NewtonKrylov, {"forcing": "eager"}),
         (NewtonKrylov, {"first_forcing": 1.0}),
         (NewtonKrylov, {"dimension": 0}),
-        (Newton, {"line_search": "cubic"}),
+        (LevenbergMarquardt, {"shift": 0.0}),
+        (Newton, {"globalization": {"kind": "square"}}),
         (CostOptimal, {"fresh": 1.0}),
         (ScipyRoot, {"method": "lm"}),
     ],

@@ -13,7 +13,7 @@ from pydantic import ValidationError
 
 from nlsolve import Cloud, ConstitutiveLaw, Scene, SolveError, Status
 from nlsolve.laws import stress
-from nlsolve.march import Start
+from nlsolve.start import Start
 from nlsolve.testing import check_scene
 
 COARSE = Rings(spacing=0.5)

@@ -23,7 +23,7 @@ from nlsolve.testing import check_linear_solver, check_refresh_rule, check_solve
 RULES: tuple[RefreshRule, ...] = (EveryIteration(), EveryM(), EveryM(m=2), PoorContraction(), RangeUnderOne(), Never())
 SOLVERS: tuple[NonlinearSolver, ...] = (
     Newton(),
-    Newton(halvings=0),
+    Newton(globalization={"kind": "none"}),
     ModifiedNewton(),
     AsymptoticNumericalMethod(),
     AsymptoticNumericalMethod(order=5, tolerance=1e-4),
@@ -113,7 +113,9 @@ def test_rules_say_what_their_names_say() -> None:
 @pytest.mark.parametrize(("m", "expected"), [(1, 6), (2, 3), (3, 2), (6, 1)])
 def test_every_m_factorises_once_in_m_iterations(m: int, expected: int) -> None:
     stop = StoppingTest(tolerance=1e-300)
-    _, ledger = run(SmallProblem(), Newton(halvings=0), EveryM(m=m), START, DenseLU(), stop, iterations=6)
+    _, ledger = run(
+        SmallProblem(), Newton(globalization={"kind": "none"}), EveryM(m=m), START, DenseLU(), stop, iterations=6
+    )
     assert ledger.counts["factorization"] == expected
 
 
@@ -142,7 +144,7 @@ def test_newton_converges_quadratically_and_the_chord_linearly() -> None:
     start = near(flow, 0.55)
 
     def order(rule: RefreshRule) -> float:
-        outcome, _ = run(flow, Newton(halvings=0), rule, start)
+        outcome, _ = run(flow, Newton(globalization={"kind": "none"}), rule, start)
         r = np.array([row["residual_norm"] for row in outcome.steps])
         r = np.log(r[(r > 1e-11) & (r < 1e-3)])
         return float((r[-1] - r[-2]) / (r[-2] - r[-3]))
@@ -246,7 +248,10 @@ def test_on_a_linear_problem_homotopy_and_modified_newton_leave_the_same_residua
     flow, other = spin_flow(1.0), spin_flow(0.9)
     start = near(flow, 0.5)
     left = []
-    for solver, steps in ((AsymptoticNumericalMethod(order=6, tolerance=1e9), 1), (Newton(halvings=0), 6)):
+    for solver, steps in (
+        (AsymptoticNumericalMethod(order=6, tolerance=1e9), 1),
+        (Newton(globalization={"kind": "none"}), 6),
+    ):
         ledger = Ledger()
         tangent = Tangent(PLAIN, Never(), ledger)
         tangent.refresh_if_due(Audited(other, ledger).view, start)
@@ -290,7 +295,7 @@ def test_methods_agree_on_a_power_law_flow(index: float, rule: RefreshRule) -> N
         (AsymptoticNumericalMethod, {"tolerance": 0.0}),
         (AsymptoticNumericalMethod, {"tolerance": -1e-6}),
         (AsymptoticNumericalMethod, {"tolerance": float("nan")}),
-        (Newton, {"halvings": -1}),
+        (Newton, {"globalization": {"kind": "backtracking", "trials": 0}}),
         (EveryM, {"m": 0}),
         (PoorContraction, {"limit": 0.0}),
         (SuperLU, {"ordering": "random"}),

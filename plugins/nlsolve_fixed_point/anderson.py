@@ -8,7 +8,7 @@ from typing import ClassVar, Literal
 import numpy as np
 from pydantic import Field
 
-from nlsolve import KeptTangent, NonlinearProblem, NonlinearSolver, Step
+from nlsolve import Globalized, KeptTangent, NonlinearProblem, NonlinearSolver, Step
 from nlsolve_fixed_point.mixing import Mixing
 
 
@@ -21,6 +21,9 @@ class Anderson(NonlinearSolver):
     kind: Literal["anderson"] = "anderson"
     depth: int = Field(5, ge=0, description="m, differences of past iterates that are mixed; 0: none")
     damping: float = Field(1.0, gt=0, le=1, description="β, part of f that is added")
+    globalization: Globalized = Field(  # type: ignore[assignment]
+        {"kind": "none"}, description="how far along the mixed step, 1 being all of it"
+    )
     default_refresh: ClassVar = {"kind": "poor-contraction"}
 
     def linearized(self, problem: NonlinearProblem) -> NonlinearProblem:
@@ -30,7 +33,7 @@ class Anderson(NonlinearSolver):
     def steps(self, problem: NonlinearProblem, tangent: KeptTangent, start: np.ndarray) -> Iterator[Step]:
         """The iterates u_0, u_1, …"""
         state, kept, linearized = start, False, self.linearized(problem)
-        residual = problem.residual(state)
+        residual, search = problem.residual(state), self.globalization.search(problem)
         mixing = Mixing(self.depth, self.damping)
         yield Step(state)
         while True:
@@ -39,8 +42,9 @@ class Anderson(NonlinearSolver):
             if renewed and kept:
                 mixing.forget()
             kept = not renewed
-            state = mixing.next(state, -tangent.solve(residual))
-            residual = problem.residual(state)
+            direction = mixing.next(state, -tangent.solve(residual)) - state
+            length, residual = search.length(problem, state, residual, direction)
+            state = state + length * direction
             contraction = float(np.linalg.norm(residual)) / size if size else 0.0
             tangent.observe(contraction=contraction)
-            yield Step(state, notes={"contraction": contraction})
+            yield Step(state, notes={"length": length, "contraction": contraction})

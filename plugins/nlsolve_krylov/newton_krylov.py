@@ -8,19 +8,17 @@ from typing import ClassVar, Literal
 import numpy as np
 from pydantic import Field
 
-from nlsolve import KeptTangent, NonlinearProblem, NonlinearSolver, Step
+from nlsolve import Globalized, KeptTangent, NonlinearProblem, NonlinearSolver, Step
 from nlsolve_krylov.assembled import AssembledOnce
 from nlsolve_krylov.forcing import next_forcing
 from nlsolve_krylov.gmres import gmres
 
-SUFFICIENT_DECREASE = 1e-4  # of ‖R‖, as part of what the inexact step promises
 SMALLEST_FORCING = 1e-6  # below it lies what the next residual will correct anyway
 
 
 class NewtonKrylov(NonlinearSolver):
-    """Dembo, Eisenstat & Steihaug (1982); forcing terms η of Eisenstat & Walker (1996); t is halved until
-
-        ‖R(u + t w)‖ ≤ (1 − 10⁻⁴ t (1 − η)) ‖R(u)‖.
+    """Dembo, Eisenstat & Steihaug (1982); forcing terms η of Eisenstat & Walker (1996), and t from a globalisation,
+    which is told that w promises 1 − ‖R + J w‖/‖R‖ only.
 
     J w comes from the assembled Jacobian, or without one from the residual's own series: [R(u + a w)]_1. The refresh
     rule is told the contraction per inner iteration: that is what K* can be held responsible for.
@@ -35,12 +33,14 @@ class NewtonKrylov(NonlinearSolver):
         "series", description="J w by a Jacobian assembled once an iteration, or each by a series of order 1"
     )
     dimension: int = Field(40, gt=0, description="largest dimension of the Krylov space")
-    halvings: int = Field(10, ge=0, description="lengths t that may be tried besides the full step; 0: full steps")
+    globalization: Globalized = Field(  # type: ignore[assignment]
+        {"kind": "backtracking"}, description="how the step length t is found"
+    )
     default_refresh: ClassVar = {"kind": "poor-contraction"}
 
     def steps(self, problem: NonlinearProblem, tangent: KeptTangent, start: np.ndarray) -> Iterator[Step]:
         """The iterates u_0, u_1, …"""
-        problem = AssembledOnce(problem)
+        problem, search = AssembledOnce(problem), self.globalization.search(problem)
         state, eta = start, self.first_forcing
         residual = problem.residual(state)
         yield Step(state)
@@ -51,7 +51,7 @@ class NewtonKrylov(NonlinearSolver):
                 yield Step(state)
                 continue
             found = gmres(self._product(problem, state), tangent.solve, -residual, eta * size, self.dimension)
-            length, residual = self._backtrack(problem, state, size, found.solution, found.left / size)
+            length, residual = search.length(problem, state, residual, found.solution, 1.0 - found.left / size)
             state = state + length * found.solution
             contraction = (found.left / size) ** (1.0 / found.count)
             tangent.observe(contraction=contraction)
@@ -70,14 +70,3 @@ class NewtonKrylov(NonlinearSolver):
             return expansion.coefficient(1)
 
         return along
-
-    def _backtrack(
-        self, problem: NonlinearProblem, state: np.ndarray, size: float, step: np.ndarray, eta: float
-    ) -> tuple[float, np.ndarray]:
-        """Step length and the residual there; the last length tried when none is enough."""
-        for halving in range(self.halvings + 1):
-            length = 0.5**halving
-            residual = problem.residual(state + length * step)
-            if np.linalg.norm(residual) <= (1.0 - SUFFICIENT_DECREASE * length * (1.0 - eta)) * size:
-                break
-        return length, residual

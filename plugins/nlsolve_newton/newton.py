@@ -8,28 +8,23 @@ from typing import ClassVar, Literal
 import numpy as np
 from pydantic import Field
 
-from nlsolve import KeptTangent, NonlinearProblem, NonlinearSolver, Step
-from nlsolve_newton.line_search import LineSearch, search
+from nlsolve import Globalized, KeptTangent, NonlinearProblem, NonlinearSolver, Step
 
 
 class Newton(NonlinearSolver):
-    """K* w = −R(u),  u ← u + t w,  the length t from a line search:
-
-    residual :     ‖R‖ must fall at each step; t is halved.
-    parabola :     the same; t by interpolation.
-    non-monotone : ‖R‖ must fall below the largest of its last ten values; t is halved.
-    energy :       for an R that is the gradient of a convex potential, which must fall.
+    """K* w = −R(u),  u ← u + t w,  the length t from a globalisation.
 
     The refresh rule is told what the step left of the residual.
     """
 
     kind: Literal["newton"] = "newton"
-    line_search: LineSearch = Field("residual", description="what a step length must reduce, and how it is found")
-    halvings: int = Field(10, ge=0, description="lengths t that may be tried besides the full step; 0: full steps")
+    globalization: Globalized = Field(  # type: ignore[assignment]
+        {"kind": "backtracking"}, description="how the step length t is found"
+    )
 
     def steps(self, problem: NonlinearProblem, tangent: KeptTangent, start: np.ndarray) -> Iterator[Step]:
         """The iterates u_0, u_1, …"""
-        line_search = search(self.line_search, self.halvings, problem)
+        search = self.globalization.search(problem)
         state = start
         residual = problem.residual(state)
         yield Step(state)
@@ -37,7 +32,7 @@ class Newton(NonlinearSolver):
             size = float(np.linalg.norm(residual))
             tangent.refresh_if_due(problem, state)
             direction = -tangent.solve(residual)
-            length, residual = line_search.length(problem, state, residual, direction)
+            length, residual = search.length(problem, state, residual, direction)
             state = state + length * direction
             contraction = float(np.linalg.norm(residual)) / size if size else 0.0
             tangent.observe(contraction=contraction)
