@@ -34,8 +34,8 @@ class Start(Component):
 
     `by` is a field of the law (larger values are easier) or "load" (smaller ones are). The starting method does it,
     with a new tangent each iteration; the work is counted apart from the march (columns `start_…`). An adaptive
-    continuation begins with the first of `values`, tries the second next, and goes on in steps of log(`by`), halved where
-    a stage fails and doubled where it was easy.
+    continuation begins with the first of `values`, tries the second next, and goes on in steps of log(`by`), halved
+    where a stage fails and doubled where it was easy.
     """
 
     noun: ClassVar[str] = "start"
