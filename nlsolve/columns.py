@@ -95,6 +95,8 @@ STEPS: dict[str, str] = {
     "residual_norm": "relative residual at the step",
     "difference": "relative difference from the step before, in the norm of the stopping test",
     "range": "a_max of the last series computed for the step",
+    "limited_by": "what limited that range: end of path, the range rule, pole (of a Padé), order (the highest) or cost "
+    "(a new branch is cheaper than more orders)",
     "length": "step length of the line search, or the part of the path a series advanced",
     "contraction": "residual norm over that of the step before, as the refresh rule is told (newton-krylov: per inner "
     "iteration; scipy-root: per value of R)",

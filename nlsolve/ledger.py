@@ -159,13 +159,21 @@ def _view(problem: NonlinearProblem, ledger: Ledger, remember: Any) -> Nonlinear
                     known += 1
                 return expansion.coefficient(j)
 
+            def remainder(j: int) -> Array:
+                coefficient(j - 1)
+                with ledger.entry("series_order"):
+                    return expansion.remainder(j)
+
             # Functions, not bound methods: a bound method gives its owner away.
-            self._coefficient = coefficient
+            self._coefficient, self._remainder = coefficient, remainder
             self._append = lambda term: expansion.append(term)
             self._sum = lambda a: expansion.path(a)
 
         def coefficient(self, j: int) -> Array:
             return self._coefficient(j)
+
+        def remainder(self, j: int) -> Array:
+            return self._remainder(j)
 
         def append(self, coefficient: Array) -> None:
             self._append(coefficient)

@@ -156,7 +156,7 @@ class _March:
             if self.scene.markers or self.scene.shifting:
                 self.markers = Markers(self.scene, self.setup.discretizer, self.initial, self.velocity)
             self.record_fields_if_due()
-        elif not (steady and self.tangent.branches):
+        elif not steady or stage.load < 1.0 or stage.law is not self.setup.law:
             detail = f"on the way to the first state, at {start.by} = {stage.value:g}: {outcome.detail}"
             return Outcome(outcome.status, detail, outcome.state, outcome.residual_norm, ())
         return outcome

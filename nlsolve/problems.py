@@ -25,6 +25,13 @@ class Expansion:
         """R_j, which needs u_0 … u_j."""
         return self._residual.coefficient(j)
 
+    def remainder(self, j: int) -> Array:
+        """Q_j of R_j = J u_j + Q_j, where u_j is the next to be appended: R_j as it would be with u_j = 0."""
+        self._path.append(np.zeros(self._path.shape))
+        remainder = self._residual.coefficient(j)
+        self._path.forget(j)
+        return remainder
+
     def append(self, coefficient: Array) -> None:
         """Push u_j, the next coefficient of the path."""
         self._path.append(coefficient)

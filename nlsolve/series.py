@@ -17,6 +17,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from numbers import Number
 from typing import Any, NoReturn
+from weakref import ref
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -36,6 +37,7 @@ class Series:
         self._terms = [np.array(start, dtype=float)]
         self._packed = 0
         self._buffer: Array | None = None
+        self._dependents: list[ref[Series]] = []
 
     @classmethod
     def seed(cls, value: ArrayLike) -> Series:
@@ -45,9 +47,11 @@ class Series:
         return series
 
     @classmethod
-    def _by_rule(cls, rule: Callable[[int], Array]) -> Series:
+    def _by_rule(cls, rule: Callable[[int], Array], *operands: Series) -> Series:
         series = cls(rule(0))
         series._rule = rule
+        for operand in operands:
+            operand._dependents.append(ref(series))
         return series
 
     def append(self, coefficient: ArrayLike) -> None:
@@ -58,6 +62,18 @@ class Series:
         if term.shape != self.shape:
             raise ValueError(f"a coefficient of shape {term.shape} in a series of shape {self.shape}")
         self._terms.append(term)
+
+    def forget(self, j: int) -> None:
+        """Take back y_j, y_{j+1}, … here and in all series made from this one; y_0 stays."""
+        if len(self._terms) <= j:
+            return
+        if j < 1:
+            raise ValueError(f"coefficient {j} cannot be taken back: a series keeps y_0")
+        del self._terms[j:]
+        self._packed = min(self._packed, j)
+        for reference in self._dependents:
+            if (dependent := reference()) is not None:
+                dependent.forget(j)
 
     def coefficient(self, j: int) -> Array:
         """y_j, computed now if it was not before; IndexError while the series it depends on is not known to order j."""
@@ -95,7 +111,7 @@ class Series:
     # Linear operations act on every coefficient alike.
 
     def _linear(self, operation: Callable[[Array], Array]) -> Series:
-        return Series._by_rule(lambda j: operation(self.coefficient(j)))
+        return Series._by_rule(lambda j: operation(self.coefficient(j)), self)
 
     def reshape(self, *shape: int) -> Series:
         """The same numbers in another shape."""
@@ -109,11 +125,11 @@ class Series:
 
     def __add__(self, other: Any) -> Series:
         if isinstance(other, Series):
-            return Series._by_rule(lambda j: self.coefficient(j) + other.coefficient(j))
+            return Series._by_rule(lambda j: self.coefficient(j) + other.coefficient(j), self, other)
         constant = _constant(other)
         shape = np.broadcast_shapes(self.shape, constant.shape)
         return Series._by_rule(
-            lambda j: self.coefficient(j) + constant if j == 0 else np.broadcast_to(self.coefficient(j), shape)
+            lambda j: self.coefficient(j) + constant if j == 0 else np.broadcast_to(self.coefficient(j), shape), self
         )
 
     __radd__ = __add__
@@ -197,7 +213,7 @@ def _derivative_convolve(x: Series, y: Series, j: int) -> Array:
 
 def _product(x: Series, y: Series) -> Series:
     if x is not y:
-        return Series._by_rule(lambda j: _convolve(x.head(j), y.head(j)))
+        return Series._by_rule(lambda j: _convolve(x.head(j), y.head(j)), x, y)
 
     def square(j: int) -> Array:
         half = (j + 1) // 2  # x_l x_{j−l} appears twice, but for the middle term of an even order
@@ -205,7 +221,7 @@ def _product(x: Series, y: Series) -> Series:
         total = 2.0 * np.einsum("l...,l...->...", head[:half], head[::-1][:half])
         return total if j % 2 else total + head[half] ** 2
 
-    return Series._by_rule(square)
+    return Series._by_rule(square, x)
 
 
 def _quotient(x: Series, y: Series) -> Series:
@@ -214,7 +230,7 @@ def _quotient(x: Series, y: Series) -> Series:
             return x.coefficient(0) / y.coefficient(0)
         return (x.coefficient(j) - _convolve(y.head(j)[1:], q.head(j - 1))) / y.coefficient(0)
 
-    q = Series._by_rule(rule)
+    q = Series._by_rule(rule, x, y)
     return q
 
 
@@ -228,7 +244,7 @@ def _power(x: Series, exponent: float) -> Series:
         weights = ((exponent + 1.0) / j * np.arange(1.0, j + 1.0) - 1.0).reshape(-1, *[1] * (slope.ndim - 1))
         return _convolve(weights * slope, y.head(j - 1)) / x.coefficient(0)
 
-    y = Series._by_rule(rule)
+    y = Series._by_rule(rule, x)
     return y
 
 
@@ -238,7 +254,7 @@ def _from_slope(function: np.ufunc, x: Series, slope_of: Callable[[Series], Seri
     def rule(j: int) -> Array:
         return function(x.coefficient(0)) if j == 0 else _derivative_convolve(x, slope_of_y, j)
 
-    y = Series._by_rule(rule)
+    y = Series._by_rule(rule, x)
     slope_of_y = slope_of(y)
     return y
 
@@ -256,7 +272,7 @@ def _from_inverse_slope(function: np.ufunc, x: Series, g: Series) -> Series:
             rest = rest - _convolve(weights * slope, g.head(j - 1)[1:])
         return rest / g.coefficient(0)
 
-    y = Series._by_rule(rule)
+    y = Series._by_rule(rule, x, g)
     return y
 
 
@@ -269,7 +285,7 @@ def _sine_and_cosine(x: Series, sine: np.ufunc, cosine: np.ufunc, sign: float) -
     def of_cosine(j: int) -> Array:
         return cosine(x.coefficient(0)) if j == 0 else sign * _derivative_convolve(x, s, j)
 
-    s, c = Series._by_rule(of_sine), Series._by_rule(of_cosine)
+    s, c = Series._by_rule(of_sine, x), Series._by_rule(of_cosine, x)
     return s, c
 
 

@@ -25,12 +25,12 @@ class Step:
     state : (U,) array.
     claim : True, the method itself holds this state to be the solution (a series whose range reached the end of its
         path, a library that reports success); False, it says that it failed here; None, it says nothing.
-    notes : what the method wants recorded in the `steps` table, e.g. {"range": 1.7, "length": 0.5}.
+    notes : what the method wants recorded in the `steps` table, e.g. {"range": 1.7, "limited_by": "ratio"}.
     """
 
     state: Array
     claim: bool | None = None
-    notes: Mapping[str, float] = field(default_factory=dict)
+    notes: Mapping[str, float | str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

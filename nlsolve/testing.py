@@ -232,7 +232,10 @@ def check_problem(problem: NonlinearProblem, u: Array, tolerance: float = 1e-6) 
     path = Series(u)
     for j in range(1, ORDER + 1):
         path.append(random.standard_normal(len(u)) * size / 4.0**j)
+        remainder = expansion.remainder(j).copy()
         expansion.append(path.coefficient(j))
+        product, found = jacobian @ path.coefficient(j), expansion.coefficient(j) - remainder
+        _same(found, product, _size(product), f"R_{j} less its remainder against J u_{j}", 1e-9)
     _same(expansion.path(0.5), path.sum(0.5), size, "path(a) against the sum of what was appended", 1e-12)
     coefficients = [expansion.coefficient(j) for j in range(ORDER + 1)]
     start = problem.residual(u)

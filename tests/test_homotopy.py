@@ -290,6 +290,100 @@ def test_a_series_that_advances_by_nothing_says_so() -> None:
     assert "for a series of order 3" in outcome.detail
 
 
+def test_an_order_of_the_newton_form_costs_two_of_the_residual() -> None:
+    """Q_{j+1} and [G]_j for each r_{j+1}, and one evaluation of the residual for the whole series."""
+    flow = spin_flow(0.5)
+    for form, orders in ((FIXED, 7), (NEWTON, 14)):
+        solver = Method(form=form, order=8, tolerance=1e9)
+        _, ledger = run(flow, solver, Never(), near(flow, 0.5001), stop=StoppingTest(kind="claim"))
+        counts = tuple(ledger.counts[kind] for kind in ("triangular_solve", "residual", "series_order"))
+        assert counts == (8, 1, orders)
+
+
+# What limits a range.
+
+
+def limits(solver: Method, start: Array, rule: Any = None, problem: NonlinearProblem = SMALL) -> list[str]:
+    """`limited_by` of the branches that were used."""
+    outcome, _ = run(problem, solver, rule or EveryIteration(), start, DenseLU(), stop=StoppingTest(tolerance=1e-9))
+    assert outcome.status is Status.CONVERGED, outcome.detail
+    return [row["limited_by"] for row in outcome.steps[1:] if "limited_by" in row]
+
+
+@pytest.mark.parametrize("rule", RULES)
+def test_a_branch_names_the_rule_that_limited_it_or_the_end_of_its_path(rule: Any) -> None:
+    solver = Method(order=5, tolerance=1e-5, range=rule)
+    outcome, _ = run(SMALL, solver, EveryIteration(), START - 1.5, DenseLU(), stop=StoppingTest(tolerance=1e-9))
+    named = {(row["limited_by"], row["range"] >= 1.0) for row in outcome.steps[1:]}
+    assert named == {(rule, False), ("end of path", True)}
+
+
+def test_an_adaptive_branch_names_the_highest_order_or_the_cost() -> None:
+    adaptive = Method(order=5, tolerance=1e-6, adaptive=True, range="residual-coefficient")
+    assert set(limits(adaptive, START - 1.5)) == {"order", "end of path"}
+    assert set(limits(adaptive.with_(order=60, branch_cost=0.0), START - 2.5)) == {"cost", "end of path"}
+
+
+def test_a_branch_whose_padé_has_a_pole_on_its_path_says_so() -> None:
+    made = Branch(SMALL, START, FIXED, "pade")
+    for one in rational([0.5], 6):
+        made.terms.append(one)
+    assert made.has_pole()
+    made.terms = rational([1.5], 6)
+    made._columns = None
+    assert not made.has_pole()
+
+
+@pytest.mark.parametrize("cost", [0.0, 5.0, 40.0])
+def test_orders_are_added_until_a_unit_of_path_is_cheapest(cost: float) -> None:
+    """a(p) = ρ η^(1/(p−1)) of a geometric series, ρ < 1: the p with the least (c + p)/a(p), to three orders."""
+    p = np.arange(3, 200)
+    a = 0.5 * 1e-6 ** (1.0 / (p - 1.0))
+    best = int(p[np.argmin((cost + p) / a)])
+    solver = Method(adaptive=True, branch_cost=cost)
+    stopped = next(int(j) for j in p if solver._is_dear(list(a[: j - 2]), int(j)))
+    assert abs(stopped - best) <= 3
+
+
+def test_an_expensive_tangent_makes_long_series_and_few_branches() -> None:
+    flow = spin_flow(0.3)
+    counts = []
+    for cost in (0.0, 1000.0):
+        solver = Method(order=60, adaptive=True, range="residual-coefficient", branch_cost=cost)
+        outcome, ledger = run(flow, solver, RangeUnderOne(), near(flow, 0.5), stop=StoppingTest(tolerance=1e-9))
+        assert outcome.status is Status.CONVERGED
+        counts.append((ledger.counts["factorization"], ledger.counts["triangular_solve"]))
+    (many, short), (few, long) = counts
+    assert many > few
+    assert short / many < long / few
+
+
+# η from the residual wanted.
+
+
+@pytest.mark.parametrize("wanted", [1e-4, 1e-7, 1e-10])
+@pytest.mark.parametrize("form", FORMS)
+def test_a_path_ends_at_the_residual_wanted(form: Any, wanted: float) -> None:
+    """Whatever the residual at its beginning: by the true residual at once, and not far below."""
+    flow = spin_flow(0.5)
+    for index in (0.51, 0.5001):
+        solver = Method(form=form, order=60, adaptive=True, range="true-residual", residual=wanted)
+        outcome, _ = run(flow, solver, RangeUnderOne(), near(flow, index), stop=StoppingTest(kind="claim"))
+        scale = flow.scale(near(flow, index))
+        assert outcome.steps[-1]["limited_by"] == "end of path"
+        left = float(np.linalg.norm(flow.residual(outcome.state))) / scale
+        assert left <= wanted
+        assert left > 1e-3 * wanted or outcome.steps[-1]["triangular_solves"] % 3 == 0  # three orders at least
+
+
+def test_a_wanted_residual_takes_the_place_of_the_tolerance() -> None:
+    solver = Method(tolerance=1e-30, residual=1e-6)
+    made = branch(SMALL, START, SMALL.jacobian(START), 1, FIXED)
+    assert solver._tolerance(made, 1e-6) == pytest.approx(1e-6 / np.linalg.norm(SMALL.residual(START)))
+    assert solver._tolerance(made, 1e6) == 0.1
+    assert solver._tolerance(made, None) == 1e-30
+
+
 @pytest.mark.parametrize("increments", [5, pytest.param(20, marks=pytest.mark.slow)])
 def test_a_march_of_the_papers_scene_by_the_variants_ends_in_one_field(increments: int, tmp_path: Path) -> None:
     """An adaptive series needs no more tangents than the paper's and at most three quarters of the solves of p = 20."""
@@ -315,7 +409,15 @@ grid = { solver = [
 
 @pytest.mark.parametrize(
     "fields",
-    [{"form": "riks"}, {"extrapolation": "euler"}, {"range": "arc"}, {"corrections": -1}, {"adaptive": "perhaps"}],
+    [
+        {"form": "riks"},
+        {"extrapolation": "euler"},
+        {"range": "arc"},
+        {"corrections": -1},
+        {"adaptive": "perhaps"},
+        {"residual": 0.0},
+        {"branch_cost": -1.0},
+    ],
     ids=str,
 )
 def test_nonsense_is_refused(fields: dict[str, Any]) -> None:

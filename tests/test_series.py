@@ -235,6 +235,32 @@ def test_no_coefficient_is_computed_twice() -> None:
     assert len(asked) == 6
 
 
+@pytest.mark.parametrize("name", CLOSED)
+def test_what_is_taken_back_is_computed_anew(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The lines a formula is made of bend at order 3 first, and are then put straight."""
+    right, lines = coefficients(CLOSED[name][0]())[:6], list[Series]()
+
+    def bent(start: float, slope: float = 1.0) -> Series:
+        lines.append(x := Series([start]))
+        for coefficient in (slope, 0.0, 7.0, 0.0, 0.0):
+            x.append([coefficient])
+        return x
+
+    monkeypatch.setitem(globals(), "line", bent)
+    formula = CLOSED[name][0]()
+    assert np.abs(coefficients(formula, 5) - right).max() > 1.0
+    for x in lines:
+        x.forget(3)
+        for _ in range(3):
+            x.append([0.0])
+    np.testing.assert_allclose(coefficients(formula, 5), right, rtol=1e-12, atol=1e-14)
+
+
+def test_the_start_of_a_series_cannot_be_taken_back() -> None:
+    with pytest.raises(ValueError, match="coefficient 0 cannot be taken back: a series keeps y_0"):
+        Series([1.0]).forget(0)
+
+
 # Refusals.
 
 REFUSED: dict[str, Callable[[Series], Any]] = {

@@ -50,6 +50,10 @@ class Branch:
         order = order or self.order
         return series(order) if self.kind == "series" else extrapolate(self.kind, self.columns[:, :order])
 
+    def has_pole(self) -> bool:
+        """Whether a Padé was wanted and the series is used instead, for a pole on the path."""
+        return self.kind != "series" and len(self.extrapolation().denominator) == 1
+
     def increment(self, a: float) -> np.ndarray:
         """W(a)."""
         return weighted(self.extrapolation().weights(a), self.terms)

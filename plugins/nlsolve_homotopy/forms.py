@@ -21,7 +21,6 @@ class Recurrence(ABC):
 
     def __init__(self, problem: NonlinearProblem, state: np.ndarray) -> None:
         self._expansion = problem.expand(state)
-        self._begin = lambda: problem.expand(state)
         self._rhs = -self._expansion.coefficient(0)
         self._start = self._rhs
         self._terms: list[np.ndarray] = []
@@ -37,6 +36,7 @@ class Recurrence(ABC):
     def append(self, w_j: np.ndarray) -> None:
         """Push W_j."""
         self._terms.append(w_j)
+        self._expansion.append(w_j)
 
     @abstractmethod
     def _change(self, j: int) -> np.ndarray:
@@ -58,10 +58,6 @@ def weighted(weights: np.ndarray, vectors: list[np.ndarray]) -> np.ndarray:
 class FixedPoint(Recurrence):
     """r_1 = −G(0),  r_{j+1} = r_j − [G]_j, with [.]_j the Taylor coefficient in a."""
 
-    def append(self, w_j: np.ndarray) -> None:
-        super().append(w_j)
-        self._expansion.append(w_j)
-
     def _change(self, j: int) -> np.ndarray:
         return self._expansion.coefficient(j)
 
@@ -74,8 +70,8 @@ class NewtonForm(Recurrence):
     """r_1 = −G(0),  r_{j+1} = r_j − J W_j − Q_{j+1}, where [G]_j = J W_j + Q_j and Q_j needs W_1 … W_{j−1} only.
 
     By order j of the form K* W_j = −Q_j − (J − K*) W_{j−1}; for K* = J that is J W_j = −Q_j. What the fixed-point form
-    meets one order late (its W_2 is zero, its W_3 is −K*⁻¹ Q_2) is met here at once. An expansion cannot take back the
-    W_{j+1} = 0 with which it gives Q_{j+1}, so each order runs one of its own: j more orders, and a residual.
+    meets one order late (its W_2 is zero, its W_3 is −K*⁻¹ Q_2) is met here at once, for two orders of the residual
+    instead of one: Q_{j+1}, and [G]_j to tell J W_j.
     """
 
     def __init__(self, problem: NonlinearProblem, state: np.ndarray) -> None:
@@ -84,12 +80,8 @@ class NewtonForm(Recurrence):
         self._pulls: list[np.ndarray] = []  # J W_1, J W_2, …
 
     def _change(self, j: int) -> np.ndarray:
-        expansion = self._begin()
-        for w in (*self._terms, np.zeros_like(self._q_j)):
-            expansion.append(w)
-        q_next = expansion.coefficient(j + 1)
-        self._pulls.append(expansion.coefficient(j) - self._q_j)
-        self._q_j = q_next
+        self._pulls.append(self._expansion.coefficient(j) - self._q_j)
+        q_next = self._q_j = self._expansion.remainder(j + 1)
         return self._pulls[-1] + q_next
 
     def miss(self, a: float, g: np.ndarray, weights: np.ndarray, rhs: list[np.ndarray]) -> np.ndarray:
