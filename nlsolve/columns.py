@@ -7,7 +7,7 @@ RUNS: dict[str, str] = {
     "status": "how the case ended, in a word or two",
     "message": "how the case ended, in a sentence",
     "nodes": "N, nodes of the cloud",
-    "unknowns": "U, unknown velocity components",
+    "unknowns": "U, unknown velocity components, or unknowns of a system",
     "smallest_spacing": "smallest distance between two nodes at t = 0 [mm]",
     "cloud_quality": "moving nodes: least distance of a node to its nearest over that at t = 0, over the march",
     "increments": "time steps completed; 1 for a steady state",
@@ -41,6 +41,8 @@ RUNS: dict[str, str] = {
     "divergence": "‖div V‖/‖ε̄‖ over volume points and strain points at the end, with a volumetric term",
     "velocity_error": "relative ℓ² error of the velocities of all nodes at the end, where there is an exact solution",
     "velocity_error_inside": "the same over the interior nodes alone, whose velocities are not given",
+    "root_error": "‖u − root‖/‖root‖ for the known root nearest to where a system ended (‖u‖ for the root 0)",
+    "root_singular": "true for a system whose Jacobian is singular at a known root: a small residual says little there",
     "torque": "torque of the moving wall on the material per mm of thickness [N mm/mm]",
     "torque_error": "relative error of the torque against the exact solution",
     "force_x": "force of the moving wall on the material per mm of thickness, x [N/mm]",
@@ -56,7 +58,7 @@ RUNS: dict[str, str] = {
     "audit.balance": "‖div S + f − ρ dV/dt‖/‖∇S‖ by operators other than those solved with, where no pressure acts",
     "audit.resolution": "share of the change of V between neighbouring inner nodes that its gradients do not explain",
     "audit.heating": "largest adiabatic heating S:ε̇/(ρ c_p) over the time reached, or a time 2π/reference rate [K]",
-    "doubt": "what the audits put in doubt, and the way out; empty when nothing",
+    "doubt": "what the audits, or a system's roots, put in doubt, and the way out; empty when nothing",
 }
 """`runs`: a row a case, whatever its ending. Behind these stand all parameters of the case, dotted ("solver.order")."""
 

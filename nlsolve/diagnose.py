@@ -8,6 +8,7 @@ from typing import Any
 import pandas as pd
 
 from nlsolve.columns import DIAGNOSTICS
+from nlsolve.march import Setup
 from nlsolve.status import SolveError
 from nlsolve.studies import Study
 
@@ -26,6 +27,8 @@ def diagnose(study: Study) -> pd.DataFrame:
     rows: list[dict[str, Any]] = []
     for case in study.cases:
         setup = case.setup
+        if not isinstance(setup, Setup):
+            continue  # a system has no cloud
         named = {name: case.parameters[name] for name in case.swept if telling(name)}
         try:
             cloud = setup.scene.cloud(setup.law)

@@ -17,8 +17,8 @@ PLUGINS = HOUSE.parent / "plugins"
 
 FLOORS = [
     "series component status columns",
-    "laws scenes discretizers linear problems solvers",
-    "flow tangent pressure motion march measures audit ledger driver",
+    "laws scenes systems discretizers linear problems solvers",
+    "flow algebra compression tangent pressure motion march measures audit ledger driver",
     "hookspecs registry",
     "studies locate errors outcomes condense sweeps runner store tables papers report plan diagnose figures",
     "testing small cli progress __init__",
