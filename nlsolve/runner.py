@@ -109,7 +109,7 @@ def run(
 
 
 def execute(case: Case, number: int, cases: int, tell: Listener) -> Part:
-    """March one case, or solve its system. What that raises, an interruption excepted, becomes a row: what, and where."""
+    """March one case, or solve its system. Whatever it raises, an interruption excepted, becomes a row that says so."""
     try:
         with threadpool_limits(limits=1):
             setup, listen = case.setup, lambda progress: tell(Event(case, number, cases, progress=progress))
