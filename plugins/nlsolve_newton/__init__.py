@@ -1,4 +1,4 @@
-"""Newton's method, modified Newton and pseudo-transient continuation."""
+"""Newton's method, modified Newton, pseudo-transient continuation, and a polyalgorithm of them."""
 
 from __future__ import annotations
 
@@ -7,10 +7,11 @@ from collections.abc import Iterable
 from nlsolve import Component, hookimpl
 from nlsolve_newton.newton import ModifiedNewton, Newton
 from nlsolve_newton.pseudo_transient import PseudoTransient
+from nlsolve_newton.robust import Robust
 
-__all__ = ["ModifiedNewton", "Newton", "PseudoTransient"]
+__all__ = ["ModifiedNewton", "Newton", "PseudoTransient", "Robust"]
 
 
 @hookimpl
 def nlsolve_components() -> Iterable[type[Component]]:
-    return [Newton, ModifiedNewton, PseudoTransient]
+    return [Newton, ModifiedNewton, PseudoTransient, Robust]
