@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-import scipy.sparse.linalg
 
 from nlsolve.columns import STEPS
 from nlsolve.compression import Compression
@@ -19,7 +18,7 @@ from nlsolve.march import Progress, Record
 from nlsolve.problems import Expansion, NonlinearProblem
 from nlsolve.series import Array, Series
 from nlsolve.solvers import NonlinearSolver, RefreshRule
-from nlsolve.status import Status
+from nlsolve.status import SolveError, Status
 from nlsolve.systems import System
 from nlsolve.tangent import Tangent
 
@@ -49,6 +48,7 @@ class Algebraic(NonlinearProblem):
     """
 
     def __init__(self, system: System) -> None:
+        self.is_gradient = system.is_gradient
         self._formula = system.formula
         self._compression = Compression(system.pattern(), len(system.standard_start()))
 
@@ -81,7 +81,7 @@ def solve_system(setup: AlgebraicSetup, listen: Callable[[Progress], None] | Non
     error = root_error(setup.scene, outcome.state)
     doubt = ""
     if outcome.status is Status.CONVERGED and not error <= NEAR:
-        outcome, doubt = verified(problem, outcome, known=not np.isnan(error))
+        outcome, doubt = verified(problem, outcome, setup.linear, known=not np.isnan(error))
     solved = outcome.status in (Status.CONVERGED, Status.OTHER_ROOT)
     if listen is not None:
         listen(Progress(1, 1, tangent.branches, ledger.counts["factorization"]))
@@ -113,12 +113,12 @@ def root_error(system: System, u: Array) -> float:
     return np.nan if root is None else float(np.linalg.norm(u - root)) / _size(root)
 
 
-def verified(problem: NonlinearProblem, outcome: Outcome, known: bool) -> tuple[Outcome, str]:
+def verified(problem: NonlinearProblem, outcome: Outcome, linear: LinearSolver, known: bool) -> tuple[Outcome, str]:
     """The outcome of a state at which the stopping test is met away from all known roots, and what is in doubt of it.
 
     Another root when Newton's steps stay; elsewhere F may be small without a zero, as it is far out on exp(−x).
     """
-    moved = displacement(problem, outcome.state)
+    moved = displacement(problem, outcome.state, linear)
     if moved <= NEAR:
         found = Status.OTHER_ROOT
         return (replace(outcome, status=found, detail=found.sentence) if known else outcome), ""
@@ -128,8 +128,8 @@ def verified(problem: NonlinearProblem, outcome: Outcome, known: bool) -> tuple[
     )
 
 
-def displacement(problem: NonlinearProblem, u: Array) -> float:
-    """‖u_10 − u‖/‖u‖ for ten Newton steps from u, off the clock; infinite when a step is not finite."""
+def displacement(problem: NonlinearProblem, u: Array, linear: LinearSolver) -> float:
+    """‖u_10 − u‖/‖u‖ for ten Newton steps from u, off the clock; infinite when a step fails."""
     state = u
     for _ in range(POLISHING):
         residual, jacobian = problem.residual(state), problem.jacobian(state)
@@ -138,8 +138,13 @@ def displacement(problem: NonlinearProblem, u: Array) -> float:
         if len(u) <= DENSE:
             step = np.linalg.lstsq(jacobian.toarray(), -residual, rcond=None)[0]
         else:
-            step = scipy.sparse.linalg.lsmr(jacobian, -residual, atol=1e-12, btol=1e-12)[0]
+            try:
+                step = linear.factorize(jacobian).solve(-residual)
+            except SolveError:
+                return np.inf
         state = state + step
+        if np.linalg.norm(step) <= np.finfo(float).eps * np.linalg.norm(state):
+            break
     moved = float(np.linalg.norm(state - u)) / _size(u)
     return moved if np.isfinite(moved) else np.inf
 

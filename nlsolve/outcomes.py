@@ -22,6 +22,12 @@ OUTCOME = "outcome"
 
 RIGHT, DOUBTED, WRONG = "right", "doubted", "wrong"
 
+AT_A_SOLUTION = (Status.CONVERGED.word, Status.OTHER_ROOT.word)
+"""Statuses of runs that met their stopping test."""
+
+SOLVED = "solved"
+"""How many runs are, see `solved`: a column of tables that count."""
+
 ACCEPTED = 0.05
 """Relative error up to which a converged run is right."""
 
@@ -40,6 +46,11 @@ def outcome(run: Run, accepted: float = ACCEPTED, error: str = "velocity_error")
         return DOUBTED
     known = number(run.get(error))
     return Status.CONVERGED.word if np.isnan(known) else RIGHT if known <= accepted else WRONG
+
+
+def solved(run: Run, accepted: float = ACCEPTED, error: str = "velocity_error") -> bool:
+    """Whether a run counts as solved: right, at another root, or converged where nobody knows the error."""
+    return outcome(run, accepted, error) in (RIGHT, *AT_A_SOLUTION)
 
 
 def doubt(run: Run) -> str:

@@ -70,6 +70,11 @@ class System(Component, ABC):
         """True when the Jacobian is singular at a known root: F is flat there, and a small residual says little."""
         return False
 
+    @property
+    def is_gradient(self) -> bool:
+        """True when F is the gradient of a convex potential."""
+        return False
+
     def nearest_root(self, u: Array) -> Array | None:
         """The known root, shape (U,), that is nearest to u; None where none is known."""
         roots = self.roots()

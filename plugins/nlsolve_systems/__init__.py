@@ -5,11 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from nlsolve import Component, hookimpl
+from nlsolve_systems.bratu import Bratu
+from nlsolve_systems.chandrasekhar import Chandrasekhar
+from nlsolve_systems.p_laplacian import PLaplacian
 from nlsolve_systems.published import Published
 
-__all__ = ["Published"]
+__all__ = ["Bratu", "Chandrasekhar", "PLaplacian", "Published"]
 
 
 @hookimpl
 def nlsolve_components() -> Iterable[type[Component]]:
-    return [Published]
+    return [Published, Bratu, Chandrasekhar, PLaplacian]

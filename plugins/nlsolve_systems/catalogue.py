@@ -140,7 +140,7 @@ TEST_NONLIN: dict[str, Listed] = {
     "hammarling-2-by-2": Listed(burkardt.hammarling, 4, identity, square_roots),
     "hammarling-3-by-3": Listed(burkardt.hammarling, 9, identity, square_roots, singular=True),
     "dennis-schnabel": Listed(burkardt.dennis_schnabel, 2, at(1.0, 5.0), roots((0.0, 3.0), (3.0, 0.0))),
-    "sample-18": Listed(burkardt.sample_18, 2, at(2.0, 2.0), zeros, singular=True, nearest=on_an_axis),
+    "sample-18": Listed(burkardt.sample_18, 2, at(2.0, 2.0), singular=True, nearest=on_an_axis),
     "sample-19": Listed(burkardt.sample_19, 2, at(3.0, 3.0), zeros, singular=True),
     "scalar": Listed(burkardt.scalar, 1, at(1.0), roots((0.0,), (5.0,)), singular=True),
     "freudenstein-roth": Listed(burkardt.freudenstein_roth, 2, at(0.5, -2.0), roots((5.0, 4.0))),

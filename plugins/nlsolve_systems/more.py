@@ -6,7 +6,7 @@ Burkardt's TEST_NONLIN are word for word among them.
 
 from __future__ import annotations
 
-from functools import reduce
+from functools import cache, reduce
 from operator import mul
 from typing import Any
 
@@ -21,6 +21,7 @@ def numbers(u: Any) -> np.ndarray:
     return upright(np.arange(1.0, u.shape[0] + 1.0), u)
 
 
+@cache
 def shifted(size: int, below: float, above: float) -> Any:
     """The matrix with `below` and `above` beside an empty diagonal."""
     return sp.diags_array([below, above], offsets=[-1, 1], shape=(size, size), format="csr")
@@ -138,6 +139,7 @@ def broyden_banded(u: Any) -> Any:
     return u * (2.0 + 5.0 * u**2) + 1.0 - band(u.shape[0]) @ (u * (1.0 + u))
 
 
+@cache
 def band(size: int) -> Any:
     """Ones on the five diagonals below the main one and on the one above."""
     offsets = [offset for offset in (-5, -4, -3, -2, -1, 1) if abs(offset) < size]
