@@ -27,9 +27,11 @@ def diagnose(study: Study) -> pd.DataFrame:
     rows: list[dict[str, Any]] = []
     for case in study.cases:
         setup = case.setup
-        if not isinstance(setup, Setup):
-            continue  # a system has no cloud
         named = {name: case.parameters[name] for name in case.swept if telling(name)}
+        if not isinstance(setup, Setup):
+            without = {**named, "operator": "a system of equations has no cloud, and no operators on it"}
+            rows += [without] if without not in rows else []
+            continue
         try:
             cloud = setup.scene.cloud(setup.law)
             key = hashlib.sha256(cloud.nodes.tobytes() + setup.discretizer.model_dump_json().encode()).hexdigest()
