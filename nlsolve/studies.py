@@ -38,6 +38,9 @@ OF_A_SYSTEM = tuple(field.name for field in fields(AlgebraicSetup))
 DEFAULT_KINDS = {"linear": {"kind": "superlu"}, "starter": {"kind": "newton"}}
 """Sections that may be left out, or written without a kind."""
 
+DEFAULT_KINDS_OF_A_SYSTEM = {"linear": {"kind": "superlu"}, "solver": {"kind": "robust"}}
+"""The same where the scene is a system of equations: it may be solved without a choice of the method."""
+
 DIGEST_LETTERS = 12
 
 
@@ -262,9 +265,8 @@ class _Builder:
         if needless:
             sentence = "a scene that is a system of equations has no such section: leave it out"
             raise _Refused([Problem((name,), ABSENT, sentence) for name in needless])
-        for section, default in DEFAULT_KINDS.items():
-            if section in sections:
-                self.complete(document, section, default)
+        for section, default in (DEFAULT_KINDS_OF_A_SYSTEM if of_a_system else DEFAULT_KINDS).items():
+            self.complete(document, section, default)
         solver = self.named(document, "solver")
         if issubclass(solver, NonlinearSolver):
             self.complete(document, "refresh", solver.default_refresh)
