@@ -13,10 +13,11 @@ from nlsolve.predictors import Predictor
 from nlsolve.problems import Expansion, NonlinearProblem
 from nlsolve.runner import Results, run
 from nlsolve.scenes import Cloud, Exact, Scene
-from nlsolve.series import Series
+from nlsolve.series import Series, upright
 from nlsolve.solvers import Evidence, KeptTangent, NonlinearSolver, RefreshRule, Step
 from nlsolve.status import SolveError, Status
 from nlsolve.studies import Study
+from nlsolve.systems import System
 
 try:
     __version__ = version("nlsolve")
@@ -50,9 +51,11 @@ __all__ = [
     "Status",
     "Step",
     "Study",
+    "System",
     "__version__",
     "hookimpl",
     "local_index",
     "run",
     "stress",
+    "upright",
 ]

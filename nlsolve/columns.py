@@ -15,7 +15,7 @@ RUNS: dict[str, str] = {
     "blame_regularized": "share of the strain points with ε̄ < ε₀ at that state",
     "blame_unknown": "of a failed solve of a system: the number of the unknown whose equation is farthest from solved",
     "nodes": "N, nodes of the cloud",
-    "unknowns": "U, unknown velocity components",
+    "unknowns": "U, unknown velocity components, or unknowns of a system",
     "smallest_spacing": "smallest distance between two nodes at t = 0 [mm]",
     "cloud_quality": "moving nodes: least distance of a node to its nearest over that at t = 0, over the march",
     "increments": "time steps completed; 1 for a steady state",
@@ -53,6 +53,8 @@ RUNS: dict[str, str] = {
     "discretisation of the same nodes (section `counterpart`) would change these velocities",
     "reference_error": "relative ℓ² difference of the velocities of all nodes at the end from those of the case that "
     "the study makes its reference",
+    "root_error": "‖u − root‖/‖root‖ for the known root nearest to where a system ended (‖u‖ for the root 0)",
+    "root_singular": "true for a system whose Jacobian is singular at a known root: a small residual says little there",
     "torque": "torque of the moving wall on the material per mm of thickness [N mm/mm]",
     "torque_error": "relative error of the torque against the exact solution",
     "force_x": "force of the moving wall on the material per mm of thickness, x [N/mm]",
@@ -68,7 +70,7 @@ RUNS: dict[str, str] = {
     "audit.balance": "‖div S + f − ρ dV/dt‖/‖∇S‖ by operators other than those solved with, where no pressure acts",
     "audit.resolution": "share of the change of V between neighbouring inner nodes that its gradients do not explain",
     "audit.heating": "largest adiabatic heating S:ε̇/(ρ c_p) over the time reached, or a time 2π/reference rate [K]",
-    "doubt": "what the audits put in doubt, and the way out; empty when nothing",
+    "doubt": "what the audits, or a system's roots, put in doubt, and the way out; empty when nothing",
 }
 """`runs`: a row a case, whatever its ending. Behind these stand all parameters of the case, dotted ("solver.order")."""
 

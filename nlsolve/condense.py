@@ -9,7 +9,7 @@ import pandas as pd
 from pydantic import Field
 
 from nlsolve.component import Component
-from nlsolve.outcomes import Run, cheapest, is_error, percent
+from nlsolve.outcomes import SOLVED, Run, cheapest, is_error, percent
 from nlsolve.status import Status
 
 NO_RUN = "–"
@@ -48,9 +48,10 @@ class Cheapest(Component):
 
 
 def counted(runs: Sequence[Run], groups: tuple[str, ...]) -> list[Record]:
-    """A record a group, with the column `runs`: how many there are."""
+    """A record a group, with the columns `runs`, how many there are, and `solved`, how many of them are."""
     return [
-        {**dict(zip(groups, key, strict=True)), COUNT: len(members)} for key, members in grouped(runs, groups).items()
+        {**dict(zip(groups, key, strict=True)), COUNT: len(members), SOLVED: sum(bool(run[SOLVED]) for run in members)}
+        for key, members in grouped(runs, groups).items()
     ]
 
 

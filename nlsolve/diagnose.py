@@ -8,6 +8,7 @@ from typing import Any
 import pandas as pd
 
 from nlsolve.columns import DIAGNOSTICS
+from nlsolve.march import Setup
 from nlsolve.status import SolveError
 from nlsolve.studies import Study
 
@@ -27,6 +28,10 @@ def diagnose(study: Study) -> pd.DataFrame:
     for case in study.cases:
         setup = case.setup
         named = {name: case.parameters[name] for name in case.swept if telling(name)}
+        if not isinstance(setup, Setup):
+            without = {**named, "operator": "a system of equations has no cloud, and no operators on it"}
+            rows += [without] if without not in rows else []
+            continue
         try:
             cloud = setup.scene.cloud(setup.law)
             key = hashlib.sha256(cloud.nodes.tobytes() + setup.discretizer.model_dump_json().encode()).hexdigest()

@@ -45,6 +45,24 @@ class Ledger:
             self.seconds[kind] += time.process_time() - begun  # type: ignore[assignment]
             self.counts[kind] += 1
 
+    def work(self) -> dict[str, float]:
+        """What a method has asked for, and the seconds it took, under the names of `nlsolve.columns.RUNS`."""
+        return {
+            "factorizations": self.counts["factorization"],
+            "triangular_solves": self.counts["triangular_solve"],
+            "jacobians": self.counts["jacobian"],
+            "residuals": self.counts["residual"],
+            "series_orders": self.counts["series_order"],
+            "seconds": self.seconds["method"],
+            "seconds_factorization": self.seconds["factorization"],
+            "seconds_triangular_solve": self.seconds["triangular_solve"],
+            "seconds_jacobian": self.seconds["jacobian"],
+            "seconds_residual": self.seconds["residual"],
+            "seconds_series": self.seconds["series_order"],
+            "seconds_operators": self.seconds["operators"],
+            "factor_solve_ratio": self.each("factorization") / self.each("triangular_solve"),
+        }
+
     def each(self, kind: str) -> float:
         """Mean seconds of one piece of work of this kind; NaN when there was none."""
         return self.seconds[kind] / self.counts[kind] if self.counts[kind] else float("nan")

@@ -351,7 +351,6 @@ class _March:
     def record(self, status: Status, detail: str) -> Record:
         """The row of the case, whatever its ending; what is measured on fields is of the last solved increment."""
         ledger, start = self.ledger, self.start_ledger
-        factors = self.tangent.factors
         reached = self.increments * self.scene.increment if self.scene.increments else 0.0
         validity = self.validity_time
         if validity is None and self.scene.increments and self.increments:
@@ -374,27 +373,13 @@ class _March:
             "pressure_iterations": self.pressure_iterations if self.scene.divergence else None,
             "branches": self.tangent.branches,
             "validity_time": validity,
-            "factorizations": ledger.counts["factorization"],
-            "triangular_solves": ledger.counts["triangular_solve"],
-            "jacobians": ledger.counts["jacobian"],
-            "residuals": ledger.counts["residual"],
-            "series_orders": ledger.counts["series_order"],
+            **ledger.work(),
             "start_factorizations": start.counts["factorization"],
             "start_triangular_solves": start.counts["triangular_solve"],
             "start_residuals": start.counts["residual"],
-            "seconds": ledger.seconds["method"],
-            "seconds_factorization": ledger.seconds["factorization"],
-            "seconds_triangular_solve": ledger.seconds["triangular_solve"],
-            "seconds_jacobian": ledger.seconds["jacobian"],
-            "seconds_residual": ledger.seconds["residual"],
-            "seconds_series": ledger.seconds["series_order"],
-            "seconds_operators": ledger.seconds["operators"],
             "seconds_start": start.seconds["stage"],
             "seconds_all": ledger.seconds["method"] + ledger.seconds["operators"] + start.seconds["stage"],
-            "ordering": factors.ordering if factors else None,
-            "fill": factors.fill if factors else None,
-            "factor_solve_ratio": ledger.each("factorization") / ledger.each("triangular_solve"),
-            "condition": factors.condition() if factors else None,
+            **self.tangent.facts(),
             "residual_norm": self.residual_norm,
         }
         if self.flow is not None:

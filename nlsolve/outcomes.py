@@ -23,6 +23,12 @@ OUTCOME = "outcome"
 
 RIGHT, DOUBTED, WRONG = "right", "doubted", "wrong"
 
+AT_A_SOLUTION = (Status.CONVERGED.word, Status.OTHER_ROOT.word)
+"""Statuses of runs that met their stopping test."""
+
+SOLVED = "solved"
+"""How many runs are, see `solved`: a column of tables that count."""
+
 Run = Mapping[str, Any]
 
 
@@ -38,6 +44,11 @@ def outcome(run: Run, accepted: float = ACCEPTED, error: str = "velocity_error")
         return DOUBTED
     known = number(run.get(error))
     return Status.CONVERGED.word if np.isnan(known) else RIGHT if known <= accepted else WRONG
+
+
+def solved(run: Run, accepted: float = ACCEPTED, error: str = "velocity_error") -> bool:
+    """Whether a run counts as solved: right, at another root, or converged where nobody knows the error."""
+    return outcome(run, accepted, error) in (RIGHT, *AT_A_SOLUTION)
 
 
 def doubt(run: Run) -> str:

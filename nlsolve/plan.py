@@ -10,6 +10,8 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from nlsolve.algebra import Algebraic, AlgebraicSetup
+from nlsolve.component import Component
 from nlsolve.march import Setup
 from nlsolve.status import SolveError
 from nlsolve.studies import Study
@@ -29,12 +31,16 @@ def forecast(study: Study) -> pd.DataFrame:
     rows = []
     for case in study.cases:
         setup = case.setup
-        key = "".join(part.model_dump_json() for part in (setup.scene, setup.law, setup.discretizer, setup.linear))
+        increments = clouds = 1
+        parts: list[Component] = [setup.scene, setup.linear]
+        if isinstance(setup, Setup):
+            parts += [setup.law, setup.discretizer]
+            increments = max(1, setup.scene.increments)
+            clouds = increments if setup.scene.motion_of_nodes != "fixed" else 1
+        key = "".join(part.model_dump_json() for part in parts)
         if key not in measured:
-            measured[key] = sample(setup)
+            measured[key] = sample(setup) if isinstance(setup, Setup) else sample_of_system(setup)
         costs = measured[key]
-        increments = max(1, setup.scene.increments)
-        clouds = increments if setup.scene.motion_of_nodes != "fixed" else 1
         each = costs["seconds_factorization"] + SOLVES * costs["seconds_triangular_solve"]
         rows.append(
             {
@@ -61,6 +67,21 @@ def sample(setup: Setup) -> dict[str, float]:
         return dict.fromkeys(SAMPLE, math.nan)
     found = (len(cloud.nodes), len(inside), seconds_operators, seconds_factorization, seconds_solve)
     return dict(zip(SAMPLE, found, strict=True))
+
+
+@np.errstate(all="ignore")
+def sample_of_system(setup: AlgebraicSetup) -> dict[str, float]:
+    """The same of a system, with the Jacobian at its start; NaN for what cannot be timed where that is singular."""
+    problem, seconds_operators = _timed(lambda: Algebraic(setup.scene))
+    start = setup.scene.start()
+    found = {**dict.fromkeys(SAMPLE, math.nan), "unknowns": len(start), "seconds_operators": seconds_operators}
+    try:
+        matrix = problem.jacobian(start)
+        factors, found["seconds_factorization"] = _timed(lambda: setup.linear.factorize(matrix))
+        _, found["seconds_triangular_solve"] = _timed(lambda: factors.solve(np.ones(len(start))))
+    except SolveError:
+        return found
+    return found
 
 
 def _timed(work: Callable[[], Any]) -> tuple[Any, float]:

@@ -7,6 +7,7 @@ offered twice belongs to nobody until one of the two packages is removed.
 from __future__ import annotations
 
 import inspect
+import itertools
 from collections.abc import Mapping
 from dataclasses import dataclass
 from difflib import get_close_matches
@@ -28,21 +29,22 @@ from nlsolve.linear import LinearSolver
 from nlsolve.predictors import Predictor
 from nlsolve.scenes import Scene
 from nlsolve.solvers import NonlinearSolver, RefreshRule
+from nlsolve.systems import System
 
-CONTRACTS: dict[str, type[Component]] = {
-    contract.noun: contract
-    for contract in (
-        Scene,
-        ConstitutiveLaw,
-        Discretizer,
-        LinearSolver,
-        NonlinearSolver,
-        RefreshRule,
-        Predictor,
-        Globalization,
+CONTRACTS: dict[str, tuple[type[Component], ...]] = {
+    contracts[0].noun: contracts
+    for contracts in (
+        (Scene, System),
+        (ConstitutiveLaw,),
+        (Discretizer,),
+        (LinearSolver,),
+        (NonlinearSolver,),
+        (RefreshRule,),
+        (Predictor,),
+        (Globalization,),
     )
 }
-"""What a plugin may offer, by noun, in the order of a study file."""
+"""What a plugin may offer, by noun, in the order of a study file: a scene is a flow, or a system of equations."""
 
 
 @dataclass(frozen=True)
@@ -188,8 +190,9 @@ def load_registry() -> Registry:
 
 def _checked(cls: Any) -> type[Component]:
     """`cls`, a concrete component of a known noun with a literal kind; otherwise a TypeError in a sentence."""
-    if not (isinstance(cls, type) and issubclass(cls, Component) and issubclass(cls, tuple(CONTRACTS.values()))):
-        raise TypeError(f"{cls!r} is not a subclass of one of {', '.join(c.__name__ for c in CONTRACTS.values())}")
+    contracts = tuple(itertools.chain(*CONTRACTS.values()))
+    if not (isinstance(cls, type) and issubclass(cls, Component) and issubclass(cls, contracts)):
+        raise TypeError(f"{cls!r} is not a subclass of one of {', '.join(c.__name__ for c in contracts)}")
     if inspect.isabstract(cls):
         missing = ", ".join(sorted(cls.__abstractmethods__))
         raise TypeError(f"{cls.__name__} leaves methods of its contract out: {missing}")

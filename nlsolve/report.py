@@ -13,7 +13,7 @@ import pandas as pd
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
-from nlsolve.outcomes import telling
+from nlsolve.outcomes import AT_A_SOLUTION, telling
 from nlsolve.status import Status
 
 PRINTED_DOTS_PER_INCH = 200  # of the PNGs, see nlsolve.figures
@@ -33,7 +33,7 @@ def write_report(
     tables : name -> DataFrame, or its HTML, which is trusted; everything else is escaped.
     figures : (name, caption); figures/NAME.png in the folder is linked, and a missing one is said to be missing.
     """
-    failed = runs[runs["status"] != Status.CONVERGED.word]
+    failed = runs[~runs["status"].isin(AT_A_SOLUTION)]
     parameters = telling(runs)
     environment = Environment(
         loader=PackageLoader("nlsolve", ""), autoescape=True, undefined=StrictUndefined, keep_trailing_newline=True

@@ -11,9 +11,10 @@ from typing import Any
 import pandas as pd
 from threadpoolctl import threadpool_limits
 
+from nlsolve.algebra import solve_system
 from nlsolve.errors import StudyError, did_you_mean
 from nlsolve.figures import FigureError, Frames, draw, save
-from nlsolve.march import Progress, march
+from nlsolve.march import Progress, Setup, march
 from nlsolve.references import with_reference_errors
 from nlsolve.report import write_report
 from nlsolve.status import Status
@@ -109,10 +110,11 @@ def run(
 
 
 def execute(case: Case, number: int, cases: int, tell: Listener) -> Part:
-    """March one case. Whatever it raises, an interruption excepted, becomes a row that says what and where."""
+    """March one case, or solve its system. Whatever it raises, an interruption excepted, becomes a row that says so."""
     try:
         with threadpool_limits(limits=1):
-            record = march(case.setup, lambda progress: tell(Event(case, number, cases, progress=progress)))
+            setup, listen = case.setup, lambda progress: tell(Event(case, number, cases, progress=progress))
+            record = march(setup, listen) if isinstance(setup, Setup) else solve_system(setup, listen)
     except Exception as error:  # the one boundary at which a crash turns into a result
         place = traceback.extract_tb(error.__traceback__)[-1]
         message = f"{type(error).__name__}: {error} ({place.filename}:{place.lineno})"

@@ -117,6 +117,10 @@ class Series:
         """The same numbers in another shape."""
         return self._linear(lambda y: y.reshape(*shape))
 
+    def __getitem__(self, part: Any) -> Series:
+        """A part of the numbers, by index or slice; `x, y = u` takes a series apart along its first axis."""
+        return self._linear(lambda y: y[part])
+
     def __rmatmul__(self, matrix: Any) -> Series:
         return self._linear(lambda y: matrix @ y)
 
@@ -173,7 +177,7 @@ class Series:
     def _refuse(self, *_: Any) -> NoReturn:
         raise TypeError(
             "absolute value, comparison and choice by condition are not analytic, so they have no Taylor coefficients: "
-            "write the formula with +, -, *, /, powers, exp, log, sqrt, sin, cos, sinh, cosh, tanh and asinh"
+            "write the formula with +, -, *, /, powers, exp, log, sqrt, sin, cos, atan2, sinh, cosh, tanh and asinh"
         )
 
     __abs__ = __lt__ = __le__ = __gt__ = __ge__ = __bool__ = __float__ = _refuse
@@ -186,8 +190,17 @@ class Series:
             self._refuse()
         return formula(*inputs)
 
-    def __array_function__(self, function: Callable[..., Any], *_: Any) -> NoReturn:
-        self._refuse()
+    def __array_function__(self, function: Callable[..., Any], types: Any, inputs: Any, options: Any) -> Series:
+        formula = _ARRAY_FORMULAS.get(function)
+        if formula is None:
+            self._refuse()
+        return formula(*inputs, **options)
+
+
+def upright(values: ArrayLike, u: Array | Series) -> Array:
+    """Constants (U,) as (U, 1, …), to stand beside a u of shape (U, …) in a formula that acts along the first axis."""
+    constants = _constant(values)
+    return constants.reshape(-1, *[1] * (len(u.shape) - 1))
 
 
 def _constant(value: Any) -> Array:
@@ -259,18 +272,20 @@ def _from_slope(function: np.ufunc, x: Series, slope_of: Callable[[Series], Seri
     return y
 
 
+def _inverse_slope(y: Series, g: Series, rest: Array, j: int) -> Array:
+    """y_j with coefficient j of ∫ g y′ equal to `rest`:  g₀ y_j = rest − (1/j) Σ_{l=1..j−1} l y_l g_{j−l}."""
+    if j > 1:
+        slope = y.head(j - 1)[1:]
+        weights = np.arange(1.0, float(j)).reshape(-1, *[1] * (slope.ndim - 1)) / j
+        rest = rest - _convolve(weights * slope, g.head(j - 1)[1:])
+    return rest / g.coefficient(0)
+
+
 def _from_inverse_slope(function: np.ufunc, x: Series, g: Series) -> Series:
-    """y = f(x) through g y′ = x′:  g₀ y_j = x_j − (1/j) Σ_{l=1..j−1} l y_l g_{j−l}."""
+    """y = f(x) through g y′ = x′."""
 
     def rule(j: int) -> Array:
-        if j == 0:
-            return function(x.coefficient(0))
-        rest = x.coefficient(j)
-        if j > 1:
-            slope = y.head(j - 1)[1:]
-            weights = np.arange(1.0, float(j)).reshape(-1, *[1] * (slope.ndim - 1)) / j
-            rest = rest - _convolve(weights * slope, g.head(j - 1)[1:])
-        return rest / g.coefficient(0)
+        return function(x.coefficient(0)) if j == 0 else _inverse_slope(y, g, x.coefficient(j), j)
 
     y = Series._by_rule(rule, x, g)
     return y
@@ -288,6 +303,33 @@ def _sine_and_cosine(x: Series, sine: np.ufunc, cosine: np.ufunc, sign: float) -
     s, c = Series._by_rule(of_sine, x), Series._by_rule(of_cosine, x)
     return s, c
 
+
+def _angle(y: Any, x: Any) -> Series:
+    """θ = atan2(y, x) through (x² + y²) θ′ = x y′ − y x′; as on arrays it jumps by 2π across y = 0, x < 0."""
+    y, x = (part if isinstance(part, Series) else _constant_series(part) for part in (y, x))
+    square = x * x + y * y
+
+    def rule(j: int) -> Array:
+        if j == 0:
+            return np.arctan2(y.coefficient(0), x.coefficient(0))
+        return _inverse_slope(theta, square, _derivative_convolve(y, x, j) - _derivative_convolve(x, y, j), j)
+
+    theta = Series._by_rule(rule, y, x, square)
+    return theta
+
+
+def _joined(join: Callable[..., Array], parts: Any, axis: int = 0) -> Series:
+    """np.stack or np.concatenate of series and constants of equal shapes."""
+    series = [part if isinstance(part, Series) else _constant_series(part) for part in parts]
+    return Series._by_rule(lambda j: join([part.coefficient(j) for part in series], axis=axis), *series)
+
+
+_ARRAY_FORMULAS: dict[Callable[..., Any], Callable[..., Series]] = {
+    np.sum: lambda x, axis=None: x._linear(lambda y: np.sum(y, axis=axis)),
+    np.cumsum: lambda x, axis=None: x._linear(lambda y: np.cumsum(y, axis=axis)),
+    np.stack: lambda parts, axis=0: _joined(np.stack, parts, axis),
+    np.concatenate: lambda parts, axis=0: _joined(np.concatenate, parts, axis),
+}
 
 _FORMULAS: dict[np.ufunc, Callable[..., Series]] = {
     np.add: lambda x, y: x + y if isinstance(x, Series) else y + x,
@@ -307,4 +349,5 @@ _FORMULAS: dict[np.ufunc, Callable[..., Series]] = {
     np.cosh: lambda x: _sine_and_cosine(x, np.sinh, np.cosh, 1.0)[1],
     np.tanh: lambda x: _from_slope(np.tanh, x, lambda y: 1.0 - y * y),
     np.arcsinh: lambda x: _from_inverse_slope(np.arcsinh, x, np.sqrt(1.0 + x * x)),
+    np.arctan2: _angle,
 }

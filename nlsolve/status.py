@@ -9,6 +9,7 @@ class Status(Enum):
     """The ending of one solve, of one march, or of one case."""
 
     CONVERGED = "the stopping test was met"
+    OTHER_ROOT = "the stopping test was met at a root other than the known ones"
     BUDGET_SPENT = "the iterations allowed were used up before the stopping test was met"
     STAGNATED = "the residual stopped falling well above the tolerance"
     DIVERGED = "the residual grew far beyond its first value"

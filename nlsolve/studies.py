@@ -14,7 +14,9 @@ from typing import Annotated, Any
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, create_model
 
+from nlsolve.algebra import AlgebraicSetup
 from nlsolve.columns import RUNS
+from nlsolve.component import Component
 from nlsolve.driver import Budget, StoppingTest
 from nlsolve.errors import ABSENT, Problem, Source, StudyError, did_you_mean, problems_in
 from nlsolve.figures import FigureSpec
@@ -25,6 +27,7 @@ from nlsolve.references import REFERENCE
 from nlsolve.registry import CONTRACTS, Registry, load_registry
 from nlsolve.start import LOAD, Start
 from nlsolve.sweeps import Document, Point, Setting, Sweep, assign_all, leaves, merged, places_of, swept_places
+from nlsolve.systems import System
 from nlsolve.tables import TableSpec, check
 
 SECTIONS = tuple(field.name for field in fields(Setup))
@@ -35,6 +38,12 @@ DEFAULT_KINDS = {"linear": {"kind": "superlu"}, "starter": {"kind": "newton"}, "
 
 DEFAULTS_OF_KINDS = {"solver": "refresh", "discretizer": "counterpart"}
 """Sections whose default the kind of another one names, as `default_refresh` and `default_counterpart`."""
+
+OF_A_SYSTEM = tuple(field.name for field in fields(AlgebraicSetup))
+"""Those of them that a scene without a flow has: F(u) = 0 knows no law, no discretizer, no way to a first state."""
+
+DEFAULT_KINDS_OF_A_SYSTEM = {"linear": {"kind": "superlu"}, "solver": {"kind": "robust"}}
+"""The same where the scene is a system of equations: it may be solved without a choice of the method."""
 
 DIGEST_LETTERS = 12
 
@@ -67,7 +76,7 @@ class Case:
     """
 
     id: str
-    setup: Setup
+    setup: Setup | AlgebraicSetup
     parameters: Mapping[str, Any]
     swept: tuple[str, ...]
     reference: str = ""
@@ -153,7 +162,11 @@ class _Builder:
             "budget": (Budget, Budget()),
             "record": (tuple[Annotated[float, Field(ge=0, allow_inf_nan=False)], ...], ()),
         }
-        self.model = create_model("Composition", __config__=ConfigDict(extra="forbid", frozen=True), **parts)
+        config = ConfigDict(extra="forbid", frozen=True)
+        self.model = create_model("Composition", __config__=config, **parts)
+        self.model_of_a_system = create_model(
+            "SystemComposition", __config__=config, **{name: parts[name] for name in OF_A_SYSTEM}
+        )
 
     def study(self, name: str) -> Study:
         frame = self.frame()
@@ -291,33 +304,31 @@ class _Builder:
 
     def case(self, document: Document, points: tuple[Point, ...]) -> Case:
         """Validate one combination. Raises _Invalid."""
-        for section, default in DEFAULT_KINDS.items():
+        of_a_system = issubclass(self.named(document, "scene"), System)
+        sections, model = (OF_A_SYSTEM, self.model_of_a_system) if of_a_system else (SECTIONS, self.model)
+        needless = [name for name in document if name not in sections]
+        if needless:
+            sentence = "a scene that is a system of equations has no such section: leave it out"
+            raise _Invalid([Problem((name,), ABSENT, sentence) for name in needless])
+        for section, default in (DEFAULT_KINDS_OF_A_SYSTEM if of_a_system else DEFAULT_KINDS).items():
             self.complete(document, section, default)
         for noun, section in DEFAULTS_OF_KINDS.items():
-            part = document.get(noun)
-            kind = part.get("kind") if isinstance(part, dict) else None
-            named = getattr(self.registry.classes(noun).get(str(kind)), f"default_{section}", None)
-            if named is not None:
-                self.complete(document, section, named)
+            if section not in sections:
+                continue
+            of_its_kind = getattr(self.named(document, noun), f"default_{section}", None)
+            if of_its_kind is not None:
+                self.complete(document, section, of_its_kind)
         try:
-            composition = self.model.model_validate(document)
+            composition = model.model_validate(document)
         except ValidationError as error:
-            raise _Invalid(problems_in(error, self.model, document)) from error
-        setup = Setup(**{name: getattr(composition, name) for name in SECTIONS})
+            raise _Invalid(problems_in(error, model, document)) from error
+        chosen = {name: getattr(composition, name) for name in sections}
+        setup = AlgebraicSetup(**chosen) if of_a_system else Setup(**chosen)
         if setup.stop.kind == "claim" and not setup.solver.claims:
             sentence = f"the solver {setup.solver.kind_name()!r} never claims a solution; use residual or difference"
             raise _Invalid([Problem(("stop", "kind"), "claim", sentence)])
-        try:
-            setup.start.stages(setup.law)
-        except ValidationError as error:
-            reasons = "; ".join(detail["msg"] for detail in error.errors())
-            raise _Invalid(
-                [Problem(("start", "values"), list(setup.start.values), f"refused by the law: {reasons}")]
-            ) from error
-        except ValueError as error:
-            field = "values" if setup.start.by == LOAD else "by"
-            reason = str(error).partition(": ")[2]
-            raise _Invalid([Problem(("start", field), getattr(setup.start, field), reason)]) from error
+        if isinstance(setup, Setup):
+            self.check_continuation(setup)
         plain = json.loads(composition.model_dump_json())
         canonical = json.dumps(plain, sort_keys=True, separators=(",", ":"))
         digest = hashlib.sha256(canonical.encode()).hexdigest()[:DIGEST_LETTERS]
@@ -334,6 +345,28 @@ class _Builder:
         if variant:
             parameters, names = {VARIANT: variant, **parameters}, (VARIANT, *names)
         return Case(digest, setup, parameters, names)
+
+    def check_continuation(self, setup: Setup) -> None:
+        """Refuse a way to the first state that the law cannot go."""
+        try:
+            setup.start.stages(setup.law)
+        except ValidationError as error:
+            reasons = "; ".join(detail["msg"] for detail in error.errors())
+            raise _Invalid(
+                [Problem(("start", "values"), list(setup.start.values), f"refused by the law: {reasons}")]
+            ) from error
+        except ValueError as error:
+            field = "values" if setup.start.by == LOAD else "by"
+            reason = str(error).partition(": ")[2]
+            raise _Invalid([Problem(("start", field), getattr(setup.start, field), reason)]) from error
+
+    def named(self, document: Document, section: str) -> type[Component]:
+        """The installed class that a section names, or is; Component itself where there is none."""
+        given = document.get(section)
+        if isinstance(given, Component):
+            return type(given)
+        kind = given.get("kind") if isinstance(given, dict) else None
+        return self.registry.classes(section).get(kind, Component) if isinstance(kind, str) else Component
 
     def complete(self, document: Document, section: str, default: Mapping[str, Any]) -> None:
         """Give a section that names no kind its default."""

@@ -20,9 +20,8 @@ from nlsolve.columns import RUNS
 from nlsolve.component import Component
 from nlsolve.condense import COUNT, NO_RUN, WITHIN, Cheapest, counted, key_of
 from nlsolve.errors import ABSENT, Problem, StudyError, did_you_mean
-from nlsolve.outcomes import OUTCOME, outcome
+from nlsolve.outcomes import AT_A_SOLUTION, OUTCOME, SOLVED, outcome, solved
 from nlsolve.papers import PaperValues
-from nlsolve.status import Status
 
 MEASURED = (*RUNS, OUTCOME)
 """Columns that are known only when a case has been run."""
@@ -42,7 +41,7 @@ class TableSpec(Component):
     )
     columns: Names = Field((), description="column or columns of `runs` that tell the columns apart")
     value: Names = Field(
-        (), description="column or columns of `runs` shown in the cells, or `outcome`; absent with count"
+        (), description="column or columns of `runs` shown in the cells, or `outcome`; with count: runs, solved"
     )
     where: dict[str, Scalar] = Field(default_factory=dict, description="column of `runs` -> value a run must have")
     caption: str = Field("", description="sentence above the table")
@@ -52,7 +51,9 @@ class TableSpec(Component):
     cheapest: Cheapest | None = Field(
         None, description="keep the cheapest run within each error only, of each of the rows and columns"
     )
-    count: bool = Field(False, description="cells count runs, such as rows = variant, columns = outcome")
+    count: bool = Field(
+        False, description="cells count runs, such as rows = variant, columns = outcome; value = solved: those solved"
+    )
     paper: PaperValues | None = Field(None, description="a paper's values to compare with")
 
     @field_validator("format")
@@ -67,14 +68,15 @@ class TableSpec(Component):
 
     @model_validator(mode="after")
     def _says_what_it_shows(self) -> TableSpec:
-        if self.count and (self.value or self.cheapest is not None):
-            raise ValueError(f"count = true shows numbers of runs; drop {'value' if self.value else 'cheapest'}")
+        if self.count and (self.cheapest is not None or not set(self.value) <= {COUNT, SOLVED}):
+            drop = "cheapest" if self.cheapest is not None else "value, or show runs or solved"
+            raise ValueError(f"count = true shows numbers of runs; drop {drop}")
         if not (self.count or self.value):
             raise ValueError("value is required, and missing: columns to show, or count = true")
         if not self.rows and self.cheapest is None:
             raise ValueError("rows is required, and missing: a column that tells the rows apart")
-        if self.paper is not None and (self.count or self.cheapest is not None):
-            raise ValueError("paper values are compared run by run, so neither with cheapest nor with count")
+        if self.paper is not None and self.cheapest is not None:
+            raise ValueError("paper values are compared cell by cell, so not with cheapest")
         return self
 
     @model_validator(mode="after")
@@ -86,7 +88,7 @@ class TableSpec(Component):
     @property
     def shown(self) -> Names:
         """Columns whose values are in the cells."""
-        return (COUNT,) if self.count else self.value
+        return self.value or (COUNT,)
 
     @property
     def labels(self) -> Names:
@@ -177,7 +179,8 @@ class Table:
 def build(spec: TableSpec, runs: pd.DataFrame) -> Table:
     """The declared table of these runs. Raises StudyError when two runs claim one cell or a name is unknown."""
     records = [dict(zip(runs.columns, row, strict=True)) for row in runs.itertuples(index=False)]
-    records = [{**run, OUTCOME: outcome(run, spec.accepted, spec.error)} for run in records]
+    judged = (spec.accepted, spec.error)
+    records = [{**run, OUTCOME: outcome(run, *judged), SOLVED: solved(run, *judged)} for run in records]
     problems = check(spec, records)
     if problems:
         raise StudyError(*(f"table {spec.name!r}: {problem.expected}" for problem in problems))
@@ -187,7 +190,7 @@ def build(spec: TableSpec, runs: pd.DataFrame) -> Table:
     cells = np.full((len(rows), len(columns)), 0 if spec.count else np.nan, dtype=object)
     for run in chosen:
         for value, key in zip(spec.shown, _column_keys(spec, run), strict=True):
-            failed = not spec.count and run["status"] != Status.CONVERGED.word
+            failed = not spec.count and run["status"] not in AT_A_SOLUTION
             cells[rows.index(key_of(spec.labels, run)), columns.index(key)] = run.get("status" if failed else value)
     names = (*spec.columns, "") if spec.columns and len(spec.shown) > 1 else spec.columns or ("",)
     index, header = _index(rows, spec.labels), _index(columns, names)
@@ -210,7 +213,7 @@ def check(spec: TableSpec, runs: Sequence[Mapping[str, Any]], measured: Iterable
         for place, names in [
             (("rows",), spec.rows),
             (("columns",), spec.columns),
-            (("value",), spec.value),
+            (("value",), () if spec.count else spec.value),
             (("where",), spec.where),
             (("cheapest", "cost"), contest[:1]),
             (("cheapest", "error"), contest[1:]),
@@ -226,10 +229,10 @@ def check(spec: TableSpec, runs: Sequence[Mapping[str, Any]], measured: Iterable
     if not chosen:
         asked = ", ".join(f"{name} = {value!r}" for name, value in spec.where.items())
         return [Problem(("where",), ABSENT, f"no case has these values: {asked}")]
-    if spec.count or spec.cheapest is not None:
+    if spec.cheapest is not None:
         return []
     cells: dict[tuple[Any, ...], Mapping[str, Any]] = {}
-    for run in chosen:
+    for run in () if spec.count else chosen:
         other = cells.setdefault(key_of(layout, run), run)
         if other is not run:
             differing = [name for name in run if name not in measured and not _same(run[name], other.get(name))]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -59,6 +60,15 @@ class Tangent:
             self.evidence = replace(self.evidence, contraction=contraction)
         if range is not None:
             self.evidence = replace(self.evidence, range=range)
+
+    def facts(self) -> dict[str, Any]:
+        """What the last factors know of themselves, under the names of `nlsolve.columns.RUNS`."""
+        factors = self.factors
+        return {
+            "ordering": factors.ordering if factors else None,
+            "fill": factors.fill if factors else None,
+            "condition": factors.condition() if factors else None,
+        }
 
 
 def _view(tangent: Tangent) -> KeptTangent:

@@ -17,8 +17,8 @@ PLUGINS = HOUSE.parent / "plugins"
 
 FLOORS = [
     "series component status columns",
-    "laws scenes discretizers linear problems predictors globalization solvers",
-    "flow tangent pressure motion start march measures estimate audit ledger driver",
+    "laws scenes systems discretizers linear problems predictors globalization solvers",
+    "flow algebra compression tangent pressure motion start march measures estimate audit ledger driver",
     "hookspecs registry nested",
     "studies locate errors outcomes condense sweeps references runner store tables papers report plan diagnose figures",
     "testing small cli progress __init__",

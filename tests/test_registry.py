@@ -121,7 +121,7 @@ def test_two_plugins_with_one_name():
     [
         (WithoutHook(), "TypeError: it has no function nlsolve_components marked with @hookimpl"),
         (Raising(), "RuntimeError: no licence found"),
-        (Plugin(int), "TypeError: <class 'int'> is not a subclass of one of Scene, ConstitutiveLaw"),
+        (Plugin(int), "TypeError: <class 'int'> is not a subclass of one of Scene, System"),
         (Plugin(NoKind), 'NoKind must declare its name: kind: Literal["name"] = "name"'),
         (Plugin(LooseKind), 'LooseKind must declare its name: kind: Literal["name"] = "name"'),
         (Plugin(Unfinished), "Unfinished leaves methods of its contract out: steps"),

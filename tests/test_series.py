@@ -13,7 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from nlsolve import Series, series
+from nlsolve import Series, series, upright
 from nlsolve.series import Array
 
 ORDER = 30
@@ -59,6 +59,18 @@ CLOSED: dict[str, tuple[Callable[[], Series], Array]] = {
     "1/(1 − a) · 1/(1 − a)": (lambda: (1.0 / line(1.0, -1.0)) * (1.0 / line(1.0, -1.0)), J + 1.0),
     "1/(1 − a)²": (lambda: (1.0 / line(1.0, -1.0)) ** 2, J + 1.0),
     "exp a · exp 2a": (lambda: np.exp(line(0.0)) * np.exp(line(0.0, 2.0)), 3.0**J * FACTORIALS),
+    "atan2(a, 1)": (
+        lambda: np.arctan2(line(0.0), 1.0),
+        np.array([(j % 2) * (-1.0) ** (j // 2) / max(j, 1) for j in J.tolist()]),
+    ),
+    "atan2(sin 2a, cos 2a)": (
+        lambda: np.arctan2(np.sin(line(0.0, 2.0)), np.cos(line(0.0, 2.0))),
+        np.where(J == 1, 2.0, 0.0),
+    ),
+    "atan2(1, a)": (
+        lambda: np.arctan2(1.0, line(0.0)),
+        np.array([np.pi / 2.0, *[-(j % 2) * (-1.0) ** (j // 2) / j for j in J[1:].tolist()]]),
+    ),
     # asinh a = Σ (−1)^i (2i)!/(4^i i!² (2i + 1)) a^(2i+1)
     "asinh a": (
         lambda: np.arcsinh(line(0.0)),
@@ -125,6 +137,52 @@ def test_the_matrix_the_reshape_and_the_constants_act_on_every_coefficient() -> 
     np.testing.assert_array_equal((np.array([2.0, 3.0]) * x / 2.0).head(1), [[1.0, 3.0], [3.0, 7.5]])
     np.testing.assert_array_equal((-x + x).head(1), np.zeros((2, 2)))
     assert x.shape == (2,)
+
+
+def test_parts_sums_and_joins_act_on_every_coefficient() -> None:
+    x = Series([1.0, 2.0, 4.0])
+    x.append([3.0, 5.0, 7.0])
+    np.testing.assert_array_equal(x[1:].head(1), [[2.0, 4.0], [5.0, 7.0]])
+    np.testing.assert_array_equal(x[::2].head(1), [[1.0, 4.0], [3.0, 7.0]])
+    np.testing.assert_array_equal(x[:, None].coefficient(1), [[3.0], [5.0], [7.0]])
+    a, b, c = x  # along the first axis
+    assert (a.shape, float(b.coefficient(1)), float(c.coefficient(0))) == ((), 5.0, 4.0)
+    np.testing.assert_array_equal(np.sum(x).head(1), [7.0, 15.0])
+    np.testing.assert_array_equal(np.cumsum(x, axis=0).head(1), [[1.0, 3.0, 7.0], [3.0, 8.0, 15.0]])
+    np.testing.assert_array_equal(np.stack([b, 9.0, a]).head(1), [[2.0, 9.0, 1.0], [5.0, 0.0, 3.0]])
+    np.testing.assert_array_equal(np.stack([x, np.ones(3)], axis=1).coefficient(1)[:, 1], np.zeros(3))
+    np.testing.assert_array_equal(np.concatenate([x[2:], np.ones(1)]).head(1), [[4.0, 1.0], [7.0, 0.0]])
+    with pytest.raises(IndexError):
+        x[3]
+
+
+def test_a_formula_on_parts_sums_to_its_value() -> None:
+    """Σ a^j F_j = F(u(a)) for a formula of parts, sums and joins, on columns."""
+
+    def f(u: Any) -> Any:
+        x, y, z = u
+        angle = np.arctan2(-x, y) * np.sum(u, axis=0)
+        rest = np.cumsum(u * upright([1.0, 2.0, 3.0], u), axis=0)[1:] * z
+        return np.concatenate([np.stack([angle]), rest])
+
+    u = Series(np.array([[1.3, -0.4], [2.0, 1.0], [0.5, -1.5]]))
+    for j in range(1, ORDER + 1):
+        u.append(np.array([[0.3, -0.2], [0.1, 0.2], [-0.3, 0.1]]) / j**2)
+    value = f(u)
+    value.coefficient(ORDER)
+    np.testing.assert_allclose(value.sum(0.25), f(u.sum(0.25)), rtol=1e-12)
+
+
+def test_columns_of_seeds_are_columns_of_the_jacobian() -> None:
+    u = Series(np.repeat([[1.0], [2.0]], 2, axis=1))
+    u.append(np.eye(2))
+    x, y = u
+    np.testing.assert_array_equal(np.stack([x * y, x + y**3]).coefficient(1), [[2.0, 1.0], [1.0, 12.0]])
+
+
+def test_upright_constants_stand_beside_columns() -> None:
+    assert upright([1.0, 2.0], np.zeros(2)).shape == (2,)
+    assert upright([1.0, 2.0], Series(np.zeros((2, 5)))).shape == (2, 1)
 
 
 # Algebra, for any positive series.
@@ -278,6 +336,8 @@ REFUSED: dict[str, Callable[[Series], Any]] = {
     "np.sign": np.sign,
     "np.add with out": lambda x: np.add(x, 1.0, out=np.zeros(1)),
     "np.add.reduce": np.add.reduce,
+    "np.prod": np.prod,
+    "np.sort": np.sort,
 }
 
 

@@ -29,9 +29,10 @@ class Mixing:
 
     def next(self, u: np.ndarray, f: np.ndarray) -> np.ndarray:
         """u_{k+1} from u_k and f_k = f(u_k), shape (U,)."""
-        if self._last is not None and self._depth:
-            self._states = [*self._states, u - self._last[0]][-self._depth :]
-            self._changes = [*self._changes, f - self._last[1]][-self._depth :]
+        most = min(self._depth, len(u))  # more changes than unknowns determine no γ
+        if self._last is not None and most:
+            self._states = [*self._states, u - self._last[0]][-most:]
+            self._changes = [*self._changes, f - self._last[1]][-most:]
         self._last = u, f
         plain = u + self._damping * f
         while self._changes:

@@ -1,4 +1,4 @@
-"""Newton's method, modified Newton, pseudo-transient continuation and Levenberg and Marquardt's method."""
+"""Newton's method, modified Newton, pseudo-transient, Levenberg and Marquardt's method, and a polyalgorithm of them."""
 
 from __future__ import annotations
 
@@ -8,10 +8,11 @@ from nlsolve import Component, hookimpl
 from nlsolve_newton.levenberg_marquardt import LevenbergMarquardt
 from nlsolve_newton.newton import ModifiedNewton, Newton
 from nlsolve_newton.pseudo_transient import PseudoTransient
+from nlsolve_newton.robust import Robust
 
-__all__ = ["LevenbergMarquardt", "ModifiedNewton", "Newton", "PseudoTransient"]
+__all__ = ["LevenbergMarquardt", "ModifiedNewton", "Newton", "PseudoTransient", "Robust"]
 
 
 @hookimpl
 def nlsolve_components() -> Iterable[type[Component]]:
-    return [Newton, ModifiedNewton, PseudoTransient, LevenbergMarquardt]
+    return [Newton, ModifiedNewton, PseudoTransient, LevenbergMarquardt, Robust]

@@ -1,0 +1,63 @@
+"""−div((|∇u|² + ε²)^{(p−2)/2} ∇u) = 1 in the unit interval or square, u = 0 on its boundary: the p-Laplacian.
+
+A power-law flow along a channel or a duct (Glowinski & Marroco 1975); p − 1 is its index n.
+"""
+
+from __future__ import annotations
+
+from typing import Any, Literal
+
+import numpy as np
+from pydantic import Field
+
+from nlsolve import System
+from nlsolve_systems.grids import on_points, places, slopes
+
+BISECTIONS = 200
+
+
+class PLaplacian(System):
+    """By linear elements on N × N inner points, each row over the area of a cell: a convex potential's gradient."""
+
+    kind: Literal["p-laplacian"] = "p-laplacian"
+    power: float = Field(1.5, gt=1, description="p; 2 is linear")
+    regularization: float = Field(1e-4, gt=0, description="ε")
+    dimension: Literal[1, 2] = Field(1, description="of the domain")
+    nodes: int = Field(32, gt=1, description="N, inner points on a side")
+
+    def formula(self, u: Any) -> Any:
+        """F(u)."""
+        gradient = slopes(self.nodes, self.dimension)
+        components = [derivative @ u for derivative in gradient]
+        square = sum(component**2 for component in components) + self.regularization**2
+        viscosity = square ** (0.5 * self.power - 1.0) / self.dimension  # a triangle is half a cell
+        forces = [derivative.T @ (viscosity * part) for derivative, part in zip(gradient, components, strict=True)]
+        return sum(forces) - 1.0
+
+    def standard_start(self) -> np.ndarray:
+        """x (1 − x)/2, the root for p = 2 in one dimension; in two x (1 − x) y (1 − y)."""
+        x = places(self.nodes)
+        return on_points(x * (1.0 - x), self.dimension) / (3 - self.dimension)
+
+    def pattern(self) -> Any:
+        """Points with an element in common."""
+        touched = sum(abs(derivative) for derivative in slopes(self.nodes, self.dimension))
+        return touched.T @ touched
+
+    @property
+    def is_gradient(self) -> bool:
+        """For every p > 1."""
+        return True
+
+    def roots(self) -> np.ndarray | None:
+        """In one dimension, where the flux is ½ − x in the middle of each interval: slope by slope, by bisection."""
+        if self.dimension == 2:
+            return None
+        h = np.longdouble(1) / (self.nodes + 1)
+        flux = 0.5 - (np.arange(self.nodes + 1) + np.longdouble(0.5)) * h
+        low, high = np.zeros_like(flux), np.ones_like(flux) * (1.0 + np.abs(flux)) ** (1.0 / (self.power - 1.0))
+        for _ in range(BISECTIONS):
+            slope = 0.5 * (low + high)
+            behind = slope * (slope**2 + self.regularization**2) ** (0.5 * self.power - 1.0) > np.abs(flux)
+            low, high = np.where(behind, low, slope), np.where(behind, slope, high)
+        return np.cumsum(h * np.sign(flux) * low)[None, :-1].astype(float)
