@@ -263,3 +263,13 @@ def test_nested_kinds_are_listed_among_the_plugins() -> None:
     rows = {row.kind: row for row in load_registry().plugins() if row.noun == "globalization"}
     assert set(rows) == {"none", "backtracking", "cubic", "non-monotone", "energy"}
     assert [parameter.name for parameter in rows["non-monotone"].parameters] == ["trials", "memory"]
+
+
+def test_a_residual_beyond_all_bounds_shortens_the_step() -> None:
+    """‖R‖ grows 1e200-fold along the full step: its square is no number any more, and the step is cut all the same."""
+    state = np.zeros(12)
+    residual = SmallProblem().residual(state)
+    search = Cubic(trials=30).search(SmallProblem())
+    length, shorter = search.length(SmallProblem(), state, residual, -500.0 * residual)
+    assert length < 0.01
+    assert np.linalg.norm(shorter) < np.linalg.norm(residual)

@@ -12,6 +12,7 @@ from pydantic import Field
 from nlsolve import Globalization, NonlinearProblem, Search
 
 SUFFICIENT_DECREASE = 1e-4  # of ‖R‖, as part of what is promised per unit of step length (Armijo 1966)
+OVER = 1e100  # a ratio of residuals above this counts as this: its square is still a number
 SHORTEST, LONGEST = 0.1, 0.5  # the next length over the last one (Dennis & Schnabel 1983, A6.3.1)
 
 Trials = list[tuple[float, float]]
@@ -77,7 +78,7 @@ class LeastResidual:
                 best_length, best_size, best = length, trial_size, trial
             if not size or trial_size <= (1.0 - SUFFICIENT_DECREASE * length * promised) * max(self._sizes):
                 break
-            tried.append((length, trial_size / size))
+            tried.append((length, min(trial_size / size, OVER)))
             length = self._shorter(tried, promised)
         return best_length, best
 
