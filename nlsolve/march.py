@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 import pandas as pd
-from pydantic import Field
+from pydantic import Field, ValidationInfo, field_validator
 from scipy.spatial import cKDTree
 
 from nlsolve.audit import audit
@@ -36,6 +36,10 @@ class Start(Component):
 
     The law is solved with its field `by` at each of `values` larger than the target, then at the target, by the
     starting method with a new tangent each iteration. The work is counted apart from the march (columns `start_…`).
+    Without values a steady scene is the case's own method's from rest on.
+
+    A perturbation moves the guess that each solve of the case's own method begins with, and nothing else: in a steady
+    scene the state after the continuation (or rest), in a march the state that each increment begins with.
     """
 
     noun: ClassVar[str] = "start"
@@ -45,6 +49,22 @@ class Start(Component):
     )
     values: tuple[float, ...] = Field((1.0, 0.5, 0.3, 0.2), description="its values on the way, in order")
     tolerance: float = Field(1e-10, gt=0, description="relative residual of the first state")
+    perturbation: float = Field(
+        0.0, ge=0, description="ε, size of a random change of the case's own first guesses over that of the velocity"
+    )
+    seed: int = Field(0, ge=0, description="of the perturbation; without one all seeds are one case, that of seed 0")
+
+    @field_validator("seed")
+    @classmethod
+    def _nothing_to_draw(cls, seed: int, info: ValidationInfo) -> int:
+        return seed if info.data.get("perturbation") else 0
+
+    def disturbed(self, flow: Flow, u: Array, increment: int) -> Array:
+        """u + ε ‖V‖₂ g/‖g‖₂ with V the velocities of all nodes and g normal, drawn anew for each increment."""
+        if not self.perturbation:
+            return u
+        g = np.random.default_rng([self.seed, increment]).standard_normal(len(u))
+        return u + self.perturbation * np.linalg.norm(flow.velocity(u)) / np.linalg.norm(g) * g
 
 
 @dataclass(frozen=True)
@@ -275,9 +295,8 @@ class _March:
     def solve_increment(self, k: int, flow: Flow) -> Outcome:
         """The case's own method on one increment; its rows, counts and largest residual are kept."""
         setup = self.setup
-        outcome = solve(
-            flow, setup.solver, self.tangent, flow.unknowns(self.velocity), setup.stop, setup.budget, self.ledger
-        )
+        guess = setup.start.disturbed(flow, flow.unknowns(self.velocity), k)
+        outcome = solve(flow, setup.solver, self.tangent, guess, setup.stop, setup.budget, self.ledger)
         solved = outcome.status is Status.CONVERGED
         self.iterations += max(0, len(outcome.steps) - 1)
         self.rows += [{"increment": k, "time": self.time, "accepted": False, **row} for row in outcome.steps]

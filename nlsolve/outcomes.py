@@ -5,7 +5,7 @@ The one place where results are judged: tables and figures of `runs` ask here.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -15,15 +15,18 @@ from nlsolve.columns import RUNS
 from nlsolve.status import Status
 
 VARIANT = "variant"
-"""Column of `runs` with the names of the settings a case was made by, where a sweep has named settings."""
+"""Column of `runs` with the names of the settings a case was made by, where a sweep of named settings has no name."""
 
-OUTCOME = "outcome"
-"""Column that tables derive from the others, see `outcome`."""
+OUTCOME, SOLVED = "outcome", "solved"
+"""Columns that tables derive from the others, see `outcome` and `solved`."""
 
 RIGHT, DOUBTED, WRONG = "right", "doubted", "wrong"
 
 ACCEPTED = 0.05
 """Relative error up to which a converged run is right."""
+
+VERIFIED = 1e-6
+"""Relative residual up to which a run that was stopped by something else has solved its equations."""
 
 Run = Mapping[str, Any]
 
@@ -40,6 +43,18 @@ def outcome(run: Run, accepted: float = ACCEPTED, error: str = "velocity_error")
         return DOUBTED
     known = number(run.get(error))
     return Status.CONVERGED.word if np.isnan(known) else RIGHT if known <= accepted else WRONG
+
+
+def solved(run: Run, accepted: float = ACCEPTED, error: str = "velocity_error") -> bool:
+    """Converged, at a residual that was asked for outside the method and is small enough, and not wrong.
+
+    Small enough is the tolerance of a stopping test on the residual; after a difference or a claim it is `VERIFIED`.
+    """
+    judged = outcome(run, accepted, error)
+    by_residual = run.get("stop.kind") == "residual"
+    limit = number(run.get("stop.tolerance")) if by_residual else VERIFIED
+    converged = run["status"] == Status.CONVERGED.word
+    return converged and judged != WRONG and number(run.get("residual_norm")) <= limit
 
 
 def doubt(run: Run) -> str:
@@ -59,17 +74,22 @@ def cheapest(runs: Iterable[Run], cost: str, error: str, within: float) -> Run |
 
 
 def telling(runs: pd.DataFrame) -> list[str]:
-    """Parameters that are not the same in all runs, without those that the runs' `variant` settles."""
+    """Parameters that are not the same in all runs, without those that the names of the runs' settings settle."""
     words = {str(name): [str(value) for value in runs[name]] for name in runs if name not in RUNS}
     differing = [name for name, values in words.items() if len(set(values)) > 1]
-    if VARIANT not in differing:
-        return differing
-    variants = words[VARIANT]
-    return [
-        name
-        for name in differing
-        if name == VARIANT or len(set(zip(variants, words[name], strict=True))) > len(set(variants))
-    ]
+    names = [name for name in differing if names_settings(name)]
+    return [name for name in differing if name in names or not settled(words, name, names)]
+
+
+def settled(words: Mapping[str, Sequence[str]], name: str, by: Sequence[str]) -> bool:
+    """Whether runs with the same words in the columns `by` have the same in the column `name`."""
+    keys = list(zip(*(words[column] for column in by), strict=True)) or [()] * len(words[name])
+    return len(set(zip(keys, words[name], strict=True))) == len(set(keys))
+
+
+def names_settings(column: str) -> bool:
+    """Whether a column of `runs` holds names of settings: it is not measured, and no parameter (all dotted but one)."""
+    return column not in RUNS and "." not in column and column != "record"
 
 
 def is_error(column: str) -> bool:

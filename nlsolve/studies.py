@@ -20,7 +20,7 @@ from nlsolve.errors import ABSENT, Problem, Source, StudyError, did_you_mean, pr
 from nlsolve.figures import FigureSpec
 from nlsolve.locate import Place, lines_of
 from nlsolve.march import Setup, Start
-from nlsolve.outcomes import VARIANT
+from nlsolve.outcomes import names_settings
 from nlsolve.registry import CONTRACTS, Registry, load_registry
 from nlsolve.sweeps import Document, Point, Sweep, assign_all, leaves, merged, places_of, swept_places
 from nlsolve.tables import TableSpec, check
@@ -52,7 +52,7 @@ class Case:
 
     id : digest of the validated components.
     parameters : every parameter under its dotted name ("solver.order"); lists as JSON text. Before them, where a sweep
-        has named settings, `variant`: the names of this case's.
+        has named settings, `variant` or what the sweep calls them: the names of this case's.
     swept : the names among them that the study sweeps and that differ between its cases; `variant` stands for all that
         its settings assign.
     """
@@ -65,7 +65,7 @@ class Case:
     @property
     def label(self) -> str:
         """The swept parameters, for people."""
-        words = [f"{'' if name == VARIANT else f'{name} = '}{self.parameters[name]}" for name in self.swept]
+        words = [f"{'' if names_settings(name) else f'{name} = '}{self.parameters[name]}" for name in self.swept]
         return ", ".join(words) or "the only case"
 
 
@@ -218,8 +218,11 @@ class _Builder:
                 sentences += [problem.sentence(source) for problem in refused.problems]
                 continue
             twin = cases.setdefault(case.id, case)  # what is set by hand may make two cases one
-            if twin.parameters.get(VARIANT) != case.parameters.get(VARIANT):
-                names = [each.parameters[VARIANT] for each in (twin, case)]
+            names = [
+                ", ".join(word for name, word in each.parameters.items() if names_settings(name))
+                for each in (twin, case)
+            ]
+            if names[0] != names[1]:
                 hand = " with what is set by hand" if by_hand else ""
                 same = f"{names[0]!r} and {names[1]!r} are one and the same case{hand}: change one of them, or drop it"
                 place = next(point.place for point in points if point.name)
@@ -282,9 +285,11 @@ class _Builder:
             for parameter in parameters
             if any(parameter == name or parameter.startswith(f"{name}.") for name in swept)
         )
-        variant = ", ".join(point.name for point in points if point.name)
-        if variant:
-            parameters, names = {VARIANT: variant, **parameters}, (VARIANT, *names)
+        named: dict[str, str] = {}
+        for point in points:
+            if point.name:
+                named[point.column] = ", ".join(filter(None, (named.get(point.column), point.name)))
+        parameters, names = {**named, **parameters}, (*named, *names)
         return Case(digest, setup, parameters, names)
 
     def complete(self, document: Document, section: str, default: Mapping[str, Any]) -> None:

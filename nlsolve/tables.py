@@ -1,6 +1,6 @@
 """Tables a study declares: one cell a run, rows and columns by parameter, the paper's values beside them.
 
-Or, of many runs: the cheapest within an error (`cheapest`), and how many there are (`count`).
+Or, of many runs: the cheapest within an error (`cheapest`), how many there are (`count`), the share `solved`.
 """
 
 from __future__ import annotations
@@ -17,14 +17,17 @@ from rich.table import Table as RichTable
 
 from nlsolve.columns import RUNS
 from nlsolve.component import Component
-from nlsolve.condense import COUNT, NO_RUN, WITHIN, Cheapest, counted, key_of
+from nlsolve.condense import COUNT, NO_RUN, WITHIN, Cheapest, counted, key_of, success
 from nlsolve.errors import ABSENT, Problem, StudyError, did_you_mean
-from nlsolve.outcomes import ACCEPTED, OUTCOME, outcome
+from nlsolve.outcomes import ACCEPTED, OUTCOME, SOLVED, outcome, solved
 from nlsolve.papers import PaperValues
 from nlsolve.status import Status
 
-MEASURED = (*RUNS, OUTCOME)
+MEASURED = (*RUNS, OUTCOME, SOLVED)
 """Columns that are known only when a case has been run."""
+
+SHARE = ".2f"
+"""Format of shares where a table gives none."""
 
 Scalar = bool | int | float | str
 Names = Annotated[tuple[str, ...], BeforeValidator(lambda value: (value,) if isinstance(value, str) else value)]
@@ -41,13 +44,18 @@ class TableSpec(Component):
     )
     columns: Names = Field((), description="column or columns of `runs` that tell the columns apart")
     value: Names = Field(
-        (), description="column or columns of `runs` shown in the cells, or `outcome`; absent with count"
+        (),
+        description="column or columns of `runs` shown in the cells, or `outcome`; `solved`: the share of a cell's "
+        "runs that are solved, with its interval; absent with count",
     )
-    where: dict[str, Scalar] = Field(default_factory=dict, description="column of `runs` -> value a run must have")
+    where: dict[str, Scalar | list[Scalar]] = Field(
+        default_factory=dict, description="column of `runs` -> value, or list of values, a run must have"
+    )
     caption: str = Field("", description="sentence above the table")
     format: str | None = Field(None, description='Python format of a number, such as ".2e"; absent: four digits')
     accepted: float = Field(ACCEPTED, gt=0, description="relative error up to which `outcome` is right")
     error: str = Field("velocity_error", description="column of `runs` by which `outcome` is right or wrong")
+    interval: float = Field(0.9, gt=0, lt=1, description="confidence of the interval of a share solved")
     cheapest: Cheapest | None = Field(
         None, description="keep the cheapest run within each error only, of each of the rows and columns"
     )
@@ -72,8 +80,11 @@ class TableSpec(Component):
             raise ValueError("value is required, and missing: columns to show, or count = true")
         if not self.rows and self.cheapest is None:
             raise ValueError("rows is required, and missing: a column that tells the rows apart")
-        if self.paper is not None and (self.count or self.cheapest is not None):
-            raise ValueError("paper values are compared run by run, so neither with cheapest nor with count")
+        if SOLVED in self.value and (len(self.value) > 1 or self.cheapest is not None):
+            drop = "cheapest" if self.cheapest is not None else "the other values"
+            raise ValueError(f'value = "solved" shows shares of all the runs of a cell; drop {drop}')
+        if self.paper is not None and (self.count or self.success or self.cheapest is not None):
+            raise ValueError("paper values are compared run by run, so not with cheapest, count or solved")
         return self
 
     @model_validator(mode="after")
@@ -81,6 +92,11 @@ class TableSpec(Component):
         if self.paper is not None and self.columns and len(self.value) > 1:
             raise ValueError("a table with paper values and columns should show one value only")
         return self
+
+    @property
+    def success(self) -> bool:
+        """Whether cells are shares of runs solved."""
+        return self.value == (SOLVED,)
 
     @property
     def shown(self) -> Names:
@@ -97,6 +113,8 @@ class TableSpec(Component):
         layout = (*self.rows, *self.columns)
         if self.cheapest is not None:
             return self.cheapest.of(runs, layout)
+        if self.success:
+            return success(runs, layout, self.interval, self.format or SHARE)
         return counted(runs, layout) if self.count else runs
 
     def text(self, value: Any) -> str:
@@ -176,7 +194,8 @@ class Table:
 def build(spec: TableSpec, runs: pd.DataFrame) -> Table:
     """The declared table of these runs. Raises StudyError when two runs claim one cell or a name is unknown."""
     records = [dict(zip(runs.columns, row, strict=True)) for row in runs.itertuples(index=False)]
-    records = [{**run, OUTCOME: outcome(run, spec.accepted, spec.error)} for run in records]
+    judges = {OUTCOME: outcome, SOLVED: solved}
+    records = [{**run, **{name: of(run, spec.accepted, spec.error) for name, of in judges.items()}} for run in records]
     problems = check(spec, records)
     if problems:
         raise StudyError(*(f"table {spec.name!r}: {problem.expected}" for problem in problems))
@@ -186,7 +205,7 @@ def build(spec: TableSpec, runs: pd.DataFrame) -> Table:
     cells = np.full((len(rows), len(columns)), 0 if spec.count else np.nan, dtype=object)
     for run in chosen:
         for value, key in zip(spec.shown, _column_keys(spec, run), strict=True):
-            failed = not spec.count and run["status"] != Status.CONVERGED.word
+            failed = not (spec.count or spec.success) and run["status"] != Status.CONVERGED.word
             cells[rows.index(key_of(spec.labels, run)), columns.index(key)] = run.get("status" if failed else value)
     names = (*spec.columns, "") if spec.columns and len(spec.shown) > 1 else spec.columns or ("",)
     index, header = _index(rows, spec.labels), _index(columns, names)
@@ -225,7 +244,7 @@ def check(spec: TableSpec, runs: Sequence[Mapping[str, Any]], measured: Iterable
     if not chosen:
         asked = ", ".join(f"{name} = {value!r}" for name, value in spec.where.items())
         return [Problem(("where",), ABSENT, f"no case has these values: {asked}")]
-    if spec.count or spec.cheapest is not None:
+    if spec.count or spec.success or spec.cheapest is not None:
         return []
     cells: dict[tuple[Any, ...], Mapping[str, Any]] = {}
     for run in chosen:
@@ -246,7 +265,8 @@ def check(spec: TableSpec, runs: Sequence[Mapping[str, Any]], measured: Iterable
 
 
 def _fits(spec: TableSpec, run: Mapping[str, Any]) -> bool:
-    return all(_same(run.get(name), value) for name, value in spec.where.items())
+    wanted = {name: value if isinstance(value, list) else [value] for name, value in spec.where.items()}
+    return all(any(_same(run.get(name), value) for value in values) for name, values in wanted.items())
 
 
 def _same(a: Any, b: Any) -> bool:

@@ -228,7 +228,7 @@ def test_a_kept_declaration_reads_back_the_same():
         ({"count": True, "value": [], "cheapest": {}}, "drop cheapest"),
         ({"value": []}, "value is required, and missing"),
         ({"rows": []}, "rows is required, and missing"),
-        ({"cheapest": {}, "paper": {"source": "s", "values": [[1]]}}, "neither with cheapest nor with count"),
+        ({"cheapest": {}, "paper": {"source": "s", "values": [[1]]}}, "not with cheapest, count or solved"),
         ({"cheapest": {"within": []}}, "at least 1 item"),
         ({"accepted": 0}, "greater than 0"),
     ],
