@@ -38,8 +38,8 @@ class Start(Component):
     starting method with a new tangent each iteration. The work is counted apart from the march (columns `start_…`).
     Without values a steady scene is the case's own method's from rest on.
 
-    A perturbation moves the guess that each solve of the case's own method begins with, and nothing else: in a steady
-    scene the state after the continuation (or rest), in a march the state that each increment begins with.
+    A perturbation moves the guess that each solve of the case's own method begins with: in a steady scene the state
+    after the continuation (or rest), in a march the state that each increment begins with. Equations stay the same.
     """
 
     noun: ClassVar[str] = "start"

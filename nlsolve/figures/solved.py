@@ -40,8 +40,9 @@ class Costs:
 class SolvedFigure(BaseFigure):
     """A rising stair a strategy (`group`) over a logarithmic cost; it ends at the share of problems it solves at all.
 
-    A run is a problem solved when it converged, its residual is verified and it is not wrong (`outcomes.solved`); any
-    other costs ∞. Bands hold the part `interval` of the shares when the problems are drawn anew (Efron 1979).
+    A run is a problem solved when it converged, with a verified residual and an error that is accepted or unknown
+    (`outcomes.solved`); any other costs ∞. Bands hold the part `interval` of the shares when the problems are drawn
+    anew (Efron 1979).
     """
 
     group: Names = Field(("variant",), min_length=1, description="columns of `runs` that tell the strategies apart")
@@ -51,7 +52,7 @@ class SolvedFigure(BaseFigure):
     cost: Weights = Field(
         {"seconds": 1.0}, description="column of `runs`, or columns and the weights they are added with"
     )
-    accepted: float = Field(ACCEPTED, gt=0, description="error above which an undoubted run is wrong, so not solved")
+    accepted: float = Field(ACCEPTED, gt=0, description="error above which a run is not solved")
     error: str = Field("velocity_error", description="column of `runs` that holds this error")
     bootstrap: int = Field(1000, ge=0, description="draws of problems behind the bands; 0: no bands")
     interval: float = Field(0.9, gt=0, lt=1, description="confidence of the bands")
@@ -102,10 +103,10 @@ class SolvedFigure(BaseFigure):
         for (label, _), table in zip(groups, tables, strict=True):
             missing = [key for key in everyone if key not in table]
             if missing:
+                first = ", ".join(f"{name} = {value}" for name, value in zip(problem, missing[0], strict=True))
                 raise self.refuse(
-                    f"{label} has no run of {len(missing)} of the {len(everyone)} problems, such as "
-                    f"{label_of(dict(zip(problem, missing[0], strict=True)))}: choose with `where`, "
-                    "or say with `problem` what tells the problems apart"
+                    f"{label} has no run of {len(missing)} of the {len(everyone)} problems, such as {first}: "
+                    "choose with `where`, or say with `problem` what tells the problems apart"
                 )
         cost = np.array([[self._cost(table[key]) for key in everyone] for table in tables])
         return Costs(tuple(label for label, _ in groups), cost)
