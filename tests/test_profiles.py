@@ -193,7 +193,7 @@ def test_a_performance_profile_keeps_failures_in() -> None:
     assert legend(figure) == ["a (2/4)", "b (2/4)", "c (3/4)"]
     assert figure.axes[0].get_title() == "1 of 4 problems are solved by none"
     assert figure.axes[0].get_xscale() == "log"
-    assert figure.axes[0].get_xlabel() == r"$\tau$: time inside the method [s], over the least of all strategies"
+    assert figure.axes[0].get_xlabel() == r"$\tau$: time inside the method, over the least of all strategies"
     assert len(figure.axes[0].collections) == 3  # bands
 
 

@@ -11,6 +11,7 @@ import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import LogFormatter
 from pydantic import BeforeValidator, Field
 
 from nlsolve.columns import RUNS
@@ -89,6 +90,8 @@ class SolvedFigure(BaseFigure):
         right = places[-1] * max(1.05, (places[-1] / places[0]) ** 0.03)
         self._stairs(axes, found.labels, reached, np.r_[places, right])
         axes.set_xlim(places[0], right)
+        axes.xaxis.set_major_formatter(LogFormatter())
+        axes.xaxis.set_minor_formatter(LogFormatter(minor_thresholds=(1.0, 0.4)))
         finish(figure, axes, None)
         hard = int(np.isinf(reached).all(axis=0).sum())
         nobody = f"{hard} of {reached.shape[1]} problems are solved by none" if hard else ""
@@ -150,10 +153,8 @@ class SolvedFigure(BaseFigure):
                 fill: Any = {"step": "post", "color": style["color"], "alpha": WIDEST_BAND, "linewidth": 0}
                 axes.fill_between(places, low, high, **fill)
 
-    def cost_words(self) -> str:
-        """ "time inside the method [s]", "triangular solves + 20 factorisations"."""
-        if len(self.cost) == 1:
-            return axis_label(list(self.cost), "runs")
+    def work(self) -> str:
+        """ "time inside the method", "triangular solves + 20 factorisations"."""
         return " + ".join(f"{'' if w == 1 else f'{w:g} '}{symbol(column)}" for column, w in self.cost.items())
 
 
@@ -169,7 +170,7 @@ class PerformanceFigure(SolvedFigure):
         return ratios(costs)
 
     def words(self) -> str:
-        return rf"$\tau$: {self.cost_words()}, over the least of all strategies"
+        return rf"$\tau$: {self.work()}, over the least of all strategies"
 
 
 class DataFigure(SolvedFigure):
@@ -181,7 +182,7 @@ class DataFigure(SolvedFigure):
         return costs
 
     def words(self) -> str:
-        return self.cost_words()
+        return axis_label(list(self.cost), "runs") if len(self.cost) == 1 else self.work()
 
 
 def _differing(runs: pd.DataFrame, group: Names) -> Names:
