@@ -1,4 +1,4 @@
-"""Many runs -> few rows of a table: the cheapest run within an error, or how many runs there are."""
+"""Many runs -> few cells of a table: the cheapest run within an error, how many runs there are, or the share solved."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from pydantic import Field
 
 from nlsolve.component import Component
 from nlsolve.outcomes import SOLVED, Run, cheapest, is_error, percent
+from nlsolve.shares import wilson
 from nlsolve.status import Status
 
 NO_RUN = "–"
@@ -53,6 +54,17 @@ def counted(runs: Sequence[Run], groups: tuple[str, ...]) -> list[Record]:
         {**dict(zip(groups, key, strict=True)), COUNT: len(members), SOLVED: sum(bool(run[SOLVED]) for run in members)}
         for key, members in grouped(runs, groups).items()
     ]
+
+
+def success(runs: Sequence[Run], groups: tuple[str, ...], interval: float, form: str) -> list[Record]:
+    """A record a group, with the column `solved`: the share of runs solved and its interval, "0.85 [0.70, 0.95]"."""
+    found = []
+    for key, members in grouped(runs, groups).items():
+        solved = sum(bool(run[SOLVED]) for run in members)
+        low, high = (format(end, form) for end in wilson(solved, len(members), interval))
+        text = f"{format(solved / len(members), form)} [{low}, {high}]"
+        found.append({**dict(zip(groups, key, strict=True)), SOLVED: text})
+    return found
 
 
 def grouped(runs: Sequence[Run], groups: tuple[str, ...]) -> dict[tuple[Any, ...], list[Run]]:

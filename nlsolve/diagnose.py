@@ -9,13 +9,14 @@ import pandas as pd
 
 from nlsolve.columns import DIAGNOSTICS
 from nlsolve.march import Setup
+from nlsolve.outcomes import names_settings
 from nlsolve.status import SolveError
 from nlsolve.studies import Study
 
 
 def telling(name: str) -> bool:
-    """Is this a parameter of clouds or discretizers?"""
-    return name.split(".")[0] in ("variant", "scene", "discretizer")
+    """Is this a parameter of clouds or discretizers, or the name of a setting?"""
+    return names_settings(name) or name.split(".")[0] in ("scene", "discretizer")
 
 
 def diagnose(study: Study) -> pd.DataFrame:

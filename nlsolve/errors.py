@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from difflib import get_close_matches
@@ -172,7 +173,8 @@ def _chosen(candidates: list[type[BaseModel]], document: Any) -> type[BaseModel]
 
 def _models_in(annotation: Any) -> list[type[BaseModel]]:
     """The models mentioned in a type: Annotated[A | B, …], list[A], …; of a contract, those that are installed."""
-    if isinstance(annotation, type) and issubclass(annotation, Component) and annotation in CONTRACTS.values():
+    contracts = itertools.chain(*CONTRACTS.values())
+    if isinstance(annotation, type) and issubclass(annotation, Component) and annotation in contracts:
         return list(load_registry().classes(annotation.noun).values())
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         return [annotation]

@@ -292,9 +292,8 @@ class _March:
     def solve_increment(self, k: int, flow: Flow) -> Outcome:
         """The case's own method on one increment; its rows, counts and largest residual are kept."""
         setup = self.setup
-        outcome = solve(
-            flow, setup.solver, self.tangent, flow.unknowns(self.guess), setup.stop, setup.budget, self.ledger
-        )
+        guess = setup.start.disturbed(flow, flow.unknowns(self.guess), k)
+        outcome = solve(flow, setup.solver, self.tangent, guess, setup.stop, setup.budget, self.ledger)
         solved = outcome.status is Status.CONVERGED
         self.iterations += max(0, len(outcome.steps) - 1)
         self.claimed_wrongly += outcome.claimed_wrongly

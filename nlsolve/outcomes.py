@@ -5,7 +5,7 @@ The one place where results are judged: tables and figures of `runs` ask here.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -13,21 +13,22 @@ import pandas as pd
 
 from nlsolve.audit import ACCEPTED
 from nlsolve.columns import RUNS
+from nlsolve.driver import VERIFIED
 from nlsolve.status import Status
 
 VARIANT = "variant"
-"""Column of `runs` with the names of the settings a case was made by, where a sweep has named settings."""
+"""Column of `runs` with the names of the settings a case was made by, where a sweep of named settings has no name."""
 
-OUTCOME = "outcome"
-"""Column that tables derive from the others, see `outcome`."""
+UNDOTTED = ("record", "counterpart")
+"""Parameters of a case that are no table, or may be none."""
+
+OUTCOME, SOLVED = "outcome", "solved"
+"""Columns that tables derive from the others, see `outcome` and `solved`."""
 
 RIGHT, DOUBTED, WRONG = "right", "doubted", "wrong"
 
 AT_A_SOLUTION = (Status.CONVERGED.word, Status.OTHER_ROOT.word)
 """Statuses of runs that met their stopping test."""
-
-SOLVED = "solved"
-"""How many runs are, see `solved`: a column of tables that count."""
 
 Run = Mapping[str, Any]
 
@@ -47,8 +48,18 @@ def outcome(run: Run, accepted: float = ACCEPTED, error: str = "velocity_error")
 
 
 def solved(run: Run, accepted: float = ACCEPTED, error: str = "velocity_error") -> bool:
-    """Whether a run counts as solved: right, at another root, or converged where nobody knows the error."""
-    return outcome(run, accepted, error) in (RIGHT, *AT_A_SOLUTION)
+    """At a solution, by a small enough residual asked for outside the method, with an error ≤ accepted.
+
+    Small enough is the tolerance of a stopping test on the residual; after a difference or a claim it is `VERIFIED`.
+    A doubt takes nothing from a small error; an error nobody knows must be beyond doubt. A root that is not among the
+    known ones is a root.
+    """
+    by_residual = run.get("stop.kind") == "residual"
+    limit = number(run.get("stop.tolerance")) if by_residual else VERIFIED
+    if run["status"] not in AT_A_SOLUTION or not number(run.get("residual_norm")) <= limit:
+        return False
+    known = number(run.get(error))
+    return run["status"] == Status.OTHER_ROOT.word or (not doubt(run) if np.isnan(known) else known <= accepted)
 
 
 def doubt(run: Run) -> str:
@@ -68,22 +79,27 @@ def cheapest(runs: Iterable[Run], cost: str, error: str, within: float) -> Run |
 
 
 def telling(runs: pd.DataFrame) -> list[str]:
-    """Parameters that are not the same in all runs, without those that the runs' `variant` settles."""
+    """Parameters that are not the same in all runs, without those that the names of the runs' settings settle."""
     words = {str(name): [str(value) for value in runs[name]] for name in runs if name not in RUNS}
     differing = [name for name, values in words.items() if len(set(values)) > 1]
-    if VARIANT not in differing:
-        return differing
-    variants = words[VARIANT]
-    return [
-        name
-        for name in differing
-        if name == VARIANT or len(set(zip(variants, words[name], strict=True))) > len(set(variants))
-    ]
+    names = [name for name in differing if names_settings(name)]
+    return [name for name in differing if name in names or not settled(words, name, names)]
+
+
+def settled(words: Mapping[str, Sequence[str]], name: str, by: Sequence[str]) -> bool:
+    """Whether runs with the same words in the columns `by` have the same in the column `name`."""
+    keys = list(zip(*(words[column] for column in by), strict=True)) or [()] * len(words[name])
+    return len(set(zip(keys, words[name], strict=True))) == len(set(keys))
+
+
+def names_settings(column: str) -> bool:
+    """Whether a column of `runs` holds names of settings: it is not measured, and no parameter (most are dotted)."""
+    return column not in (*RUNS, *UNDOTTED) and "." not in column
 
 
 def is_error(column: str) -> bool:
     """Whether a column is a relative error, which people read in percent."""
-    return column.endswith(("_error", "_error_inside"))
+    return column.endswith(("_error", "_error_inside", "_error_estimate"))
 
 
 def percent(fraction: float) -> str:

@@ -7,11 +7,13 @@ from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
-from pydantic import Field
+from pydantic import Field, ValidationInfo, field_validator
 
 from nlsolve.component import Component
 from nlsolve.driver import Budget, Outcome
+from nlsolve.flow import Flow
 from nlsolve.laws import ConstitutiveLaw
+from nlsolve.series import Array
 from nlsolve.status import Status
 
 LOAD = "load"
@@ -35,7 +37,11 @@ class Start(Component):
     `by` is a field of the law (larger values are easier) or "load" (smaller ones are). The starting method does it,
     with a new tangent each iteration; the work is counted apart from the march (columns `start_…`). An adaptive
     continuation begins with the first of `values`, tries the second next, and goes on in steps of log(`by`), halved
-    where a stage fails and doubled where it was easy.
+    where a stage fails and doubled where it was easy. Without values a steady scene is the case's own method's from
+    rest on.
+
+    A perturbation moves the guess that each solve of the case's own method begins with: in a steady scene the state
+    after the continuation (or rest), in a march the state that each increment begins with. Equations stay the same.
     """
 
     noun: ClassVar[str] = "start"
@@ -49,6 +55,22 @@ class Start(Component):
     smallest: float = Field(0.01, gt=0, lt=1, description="adaptive: shortest step, as part of the way in log(by)")
     iterations: int = Field(25, gt=0, description="adaptive: iterations after which a stage has failed")
     tolerance: float = Field(1e-10, gt=0, description="relative residual of the first state")
+    perturbation: float = Field(
+        0.0, ge=0, description="ε, size of a random change of the case's own first guesses over that of the velocity"
+    )
+    seed: int = Field(0, ge=0, description="of the perturbation; without one all seeds are one case, that of seed 0")
+
+    @field_validator("seed")
+    @classmethod
+    def _nothing_to_draw(cls, seed: int, info: ValidationInfo) -> int:
+        return seed if info.data.get("perturbation") else 0
+
+    def disturbed(self, flow: Flow, u: Array, increment: int) -> Array:
+        """u + ε ‖V‖₂ g/‖g‖₂ with V the velocities of all nodes and g normal, drawn anew for each increment."""
+        if not self.perturbation:
+            return u
+        g = np.random.default_rng([self.seed, increment]).standard_normal(len(u))
+        return u + self.perturbation * np.linalg.norm(flow.velocity(u)) / np.linalg.norm(g) * g
 
     def stages(self, law: ConstitutiveLaw) -> list[Stage]:
         """The stages that `values` name, and the target last. ValueError for what cannot be gone through."""

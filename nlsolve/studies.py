@@ -22,7 +22,7 @@ from nlsolve.errors import ABSENT, Problem, Source, StudyError, did_you_mean, pr
 from nlsolve.figures import FigureSpec
 from nlsolve.locate import Place, lines_of
 from nlsolve.march import Setup
-from nlsolve.outcomes import VARIANT
+from nlsolve.outcomes import VARIANT, names_settings
 from nlsolve.references import REFERENCE
 from nlsolve.registry import CONTRACTS, Registry, load_registry
 from nlsolve.start import LOAD, Start
@@ -69,7 +69,7 @@ class Case:
 
     id : digest of the validated components.
     parameters : every parameter under its dotted name ("solver.order"); lists as JSON text. Before them, where a sweep
-        has named settings, `variant`: the names of this case's.
+        has named settings, `variant` or what the sweep calls them: the names of this case's.
     swept : the names among them that the study sweeps and that differ between its cases; `variant` stands for all that
         its settings assign.
     reference : id of the case whose velocities are held to be right; empty without one.
@@ -84,7 +84,7 @@ class Case:
     @property
     def label(self) -> str:
         """The swept parameters, for people."""
-        words = [f"{'' if name == VARIANT else f'{name} = '}{self.parameters[name]}" for name in self.swept]
+        words = [f"{'' if names_settings(name) else f'{name} = '}{self.parameters[name]}" for name in self.swept]
         return ", ".join(words) or "the only case"
 
 
@@ -239,8 +239,11 @@ class _Builder:
                 continue
             source = self.source_of(points, named, by_hand)
             twin = cases.setdefault(case.id, case)  # what is set by hand may make two cases one
-            if twin.parameters.get(VARIANT) != case.parameters.get(VARIANT):
-                names = [each.parameters[VARIANT] for each in (twin, case)]
+            names = [
+                ", ".join(word for name, word in each.parameters.items() if names_settings(name))
+                for each in (twin, case)
+            ]
+            if names[0] != names[1]:
                 hand = " with what is set by hand" if by_hand else ""
                 same = f"{names[0]!r} and {names[1]!r} are one and the same case{hand}: change one of them, or drop it"
                 place = next(point.place for point in points if point.name)
@@ -281,7 +284,8 @@ class _Builder:
         named: set[str],
     ) -> Case:
         """The same combination as the reference has it: what its table sets, nobody else does."""
-        made = Setting.model_validate({"name": REFERENCE, **table}).point((REFERENCE,))
+        column = next((point.column for point in points if point.name), VARIANT)
+        made = Setting.model_validate({"name": REFERENCE, **table}).point((REFERENCE,), column)
 
         def others(values: Mapping[str, Any]) -> dict[str, Any]:
             return {
@@ -341,9 +345,11 @@ class _Builder:
             for parameter in parameters
             if any(parameter == name or parameter.startswith(f"{name}.") for name in swept)
         )
-        variant = ", ".join(point.name for point in points if point.name)
-        if variant:
-            parameters, names = {VARIANT: variant, **parameters}, (VARIANT, *names)
+        named: dict[str, str] = {}
+        for point in points:
+            if point.name:
+                named[point.column] = ", ".join(filter(None, (named.get(point.column), point.name)))
+        parameters, names = {**named, **parameters}, (*named, *names)
         return Case(digest, setup, parameters, names)
 
     def check_continuation(self, setup: Setup) -> None:

@@ -12,18 +12,23 @@ from typing import Any
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from nlsolve.component import Component
+from nlsolve.condense import COUNT, WITHIN
 from nlsolve.errors import Problem, StudyError
 from nlsolve.locate import Place
+from nlsolve.outcomes import OUTCOME, SOLVED, VARIANT, names_settings
 
 Document = dict[str, Any]
 
 
 @dataclass(frozen=True)
 class Point:
-    """One choice of a sweep: what it sets. A named setting also knows where it and each of its values are written."""
+    """One choice of a sweep: what it sets. A named setting also knows the column of `runs` its name goes into, and
+    where it and each of its values are written.
+    """
 
     values: dict[str, Any]
     name: str = ""
+    column: str = VARIANT
     place: Place = ()
     places: Mapping[str, Place] = field(default_factory=dict)
 
@@ -35,11 +40,11 @@ class Setting(BaseModel):
 
     name: str = Field(min_length=1, description="what the setting is called in `variant`")
 
-    def point(self, place: Place = ()) -> Point:
+    def point(self, place: Place = (), column: str = VARIANT) -> Point:
         """What it sets; `place` is where it is written."""
         table = self.model_extra or {}
         places = {name: (*place, *inside) for name, inside in places_of(table, whole_kinds=True).items()}
-        return Point(dict(leaves(table, whole_kinds=True)), self.name, place, places)
+        return Point(dict(leaves(table, whole_kinds=True)), self.name, column, place, places)
 
 
 class Sweep(BaseModel):
@@ -51,7 +56,8 @@ class Sweep(BaseModel):
              { name = "ε₀ = 10", "law.regularization" = 10.0 }, { name = "as it is" } ]  three points
 
     A table with a `kind` replaces the section it is for. The names of the settings become the column `variant` of
-    `runs`, joined by commas where several sweeps have them; they are no part of a case's identity.
+    `runs`, joined by commas where several sweeps have them, or the column that the sweep's `name` asks for; they are
+    no part of a case's identity.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
@@ -59,6 +65,9 @@ class Sweep(BaseModel):
     grid: dict[str, list[Any]] | None = Field(None, description="parameter -> values; all combinations")
     zip: dict[str, list[Any]] | None = Field(None, description="parameter -> values; the first of each, the second, …")
     each: tuple[Setting, ...] | None = Field(None, description="named tables of assignments; one after the other")
+    name: str = Field(
+        VARIANT, pattern=r"^[A-Za-z][A-Za-z0-9_-]*$", description="column of `runs` for the names of each"
+    )
 
     @model_validator(mode="before")
     @classmethod
@@ -72,6 +81,10 @@ class Sweep(BaseModel):
     def _values(self) -> Sweep:
         if sum(mode is not None for mode in (self.grid, self.zip, self.each)) != 1:
             raise ValueError("a sweep has one of grid, zip and each")
+        if not names_settings(self.name) or self.name in (OUTCOME, SOLVED, WITHIN, COUNT):
+            raise ValueError(f"name = {self.name!r} is a column of the results already; choose another")
+        if self.each is None and self.name != VARIANT:
+            raise ValueError(f"name = {self.name!r} is for the names of each, and there are none; drop it")
         empty = [name for name, values in self.columns.items() if not values]
         if empty or not (self.columns or self.each):
             raise ValueError(f"{empty[0]!r} has no values" if empty else "nothing is swept")
@@ -98,7 +111,7 @@ class Sweep(BaseModel):
     def points(self, place: Place = ()) -> list[Point]:
         """What is set, point by point; `place` is where the sweep is written."""
         if self.each is not None:
-            return [setting.point((*place, "each", number)) for number, setting in enumerate(self.each)]
+            return [setting.point((*place, "each", number), self.name) for number, setting in enumerate(self.each)]
         rows = (
             itertools.product(*self.columns.values()) if self.zip is None else zip(*self.columns.values(), strict=True)
         )

@@ -1,6 +1,6 @@
 """Tables a study declares: one cell a run, rows and columns by parameter, the paper's values beside them.
 
-Or, of many runs: the cheapest within an error (`cheapest`), and how many there are (`count`).
+Or, of many runs: the cheapest within an error (`cheapest`), how many there are (`count`), the share `solved`.
 """
 
 from __future__ import annotations
@@ -18,13 +18,16 @@ from rich.table import Table as RichTable
 from nlsolve.audit import ACCEPTED
 from nlsolve.columns import RUNS
 from nlsolve.component import Component
-from nlsolve.condense import COUNT, NO_RUN, WITHIN, Cheapest, counted, key_of
+from nlsolve.condense import COUNT, NO_RUN, WITHIN, Cheapest, counted, key_of, success
 from nlsolve.errors import ABSENT, Problem, StudyError, did_you_mean
 from nlsolve.outcomes import AT_A_SOLUTION, OUTCOME, SOLVED, outcome, solved
 from nlsolve.papers import PaperValues
 
-MEASURED = (*RUNS, OUTCOME)
+MEASURED = (*RUNS, OUTCOME, SOLVED)
 """Columns that are known only when a case has been run."""
+
+SHARE = ".2f"
+"""Format of shares where a table gives none."""
 
 Scalar = bool | int | float | str
 Names = Annotated[tuple[str, ...], BeforeValidator(lambda value: (value,) if isinstance(value, str) else value)]
@@ -41,13 +44,18 @@ class TableSpec(Component):
     )
     columns: Names = Field((), description="column or columns of `runs` that tell the columns apart")
     value: Names = Field(
-        (), description="column or columns of `runs` shown in the cells, or `outcome`; with count: runs, solved"
+        (),
+        description="column or columns of `runs` shown in the cells, or `outcome`; `solved`: the share of a cell's "
+        "runs that are solved, with its interval; with count: runs, solved",
     )
-    where: dict[str, Scalar] = Field(default_factory=dict, description="column of `runs` -> value a run must have")
+    where: dict[str, Scalar | list[Scalar]] = Field(
+        default_factory=dict, description="column of `runs` -> value, or list of values, a run must have"
+    )
     caption: str = Field("", description="sentence above the table")
     format: str | None = Field(None, description='Python format of a number, such as ".2e"; absent: four digits')
     accepted: float = Field(ACCEPTED, gt=0, description="relative error up to which `outcome` is right")
     error: str = Field("velocity_error", description="column of `runs` by which `outcome` is right or wrong")
+    interval: float = Field(0.9, gt=0, lt=1, description="confidence of the interval of a share solved")
     cheapest: Cheapest | None = Field(
         None, description="keep the cheapest run within each error only, of each of the rows and columns"
     )
@@ -75,8 +83,11 @@ class TableSpec(Component):
             raise ValueError("value is required, and missing: columns to show, or count = true")
         if not self.rows and self.cheapest is None:
             raise ValueError("rows is required, and missing: a column that tells the rows apart")
-        if self.paper is not None and self.cheapest is not None:
-            raise ValueError("paper values are compared cell by cell, so not with cheapest")
+        if not self.count and SOLVED in self.value and (len(self.value) > 1 or self.cheapest is not None):
+            drop = "cheapest" if self.cheapest is not None else "the other values"
+            raise ValueError(f'value = "solved" shows shares of all the runs of a cell; drop {drop}')
+        if self.paper is not None and (self.success or self.cheapest is not None):
+            raise ValueError("paper values are compared number by number, so not with cheapest or shares solved")
         return self
 
     @model_validator(mode="after")
@@ -84,6 +95,11 @@ class TableSpec(Component):
         if self.paper is not None and self.columns and len(self.value) > 1:
             raise ValueError("a table with paper values and columns should show one value only")
         return self
+
+    @property
+    def success(self) -> bool:
+        """Whether cells are shares of runs solved."""
+        return self.value == (SOLVED,) and not self.count
 
     @property
     def shown(self) -> Names:
@@ -100,6 +116,8 @@ class TableSpec(Component):
         layout = (*self.rows, *self.columns)
         if self.cheapest is not None:
             return self.cheapest.of(runs, layout)
+        if self.success:
+            return success(runs, layout, self.interval, self.format or SHARE)
         return counted(runs, layout) if self.count else runs
 
     def text(self, value: Any) -> str:
@@ -190,7 +208,7 @@ def build(spec: TableSpec, runs: pd.DataFrame) -> Table:
     cells = np.full((len(rows), len(columns)), 0 if spec.count else np.nan, dtype=object)
     for run in chosen:
         for value, key in zip(spec.shown, _column_keys(spec, run), strict=True):
-            failed = not spec.count and run["status"] not in AT_A_SOLUTION
+            failed = not (spec.count or spec.success) and run["status"] not in AT_A_SOLUTION
             cells[rows.index(key_of(spec.labels, run)), columns.index(key)] = run.get("status" if failed else value)
     names = (*spec.columns, "") if spec.columns and len(spec.shown) > 1 else spec.columns or ("",)
     index, header = _index(rows, spec.labels), _index(columns, names)
@@ -229,7 +247,7 @@ def check(spec: TableSpec, runs: Sequence[Mapping[str, Any]], measured: Iterable
     if not chosen:
         asked = ", ".join(f"{name} = {value!r}" for name, value in spec.where.items())
         return [Problem(("where",), ABSENT, f"no case has these values: {asked}")]
-    if spec.cheapest is not None:
+    if spec.success or spec.cheapest is not None:
         return []
     cells: dict[tuple[Any, ...], Mapping[str, Any]] = {}
     for run in () if spec.count else chosen:
@@ -250,7 +268,8 @@ def check(spec: TableSpec, runs: Sequence[Mapping[str, Any]], measured: Iterable
 
 
 def _fits(spec: TableSpec, run: Mapping[str, Any]) -> bool:
-    return all(_same(run.get(name), value) for name, value in spec.where.items())
+    wanted = {name: value if isinstance(value, list) else [value] for name, value in spec.where.items()}
+    return all(any(_same(run.get(name), value) for value in values) for name, values in wanted.items())
 
 
 def _same(a: Any, b: Any) -> bool:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any
 
 import agreement
@@ -9,15 +10,20 @@ import numpy as np
 import pandas as pd
 import pytest
 from cases import setup
-from nlsolve_collocation import MovingLeastSquares
+from nlsolve_collocation import LinearTriangles, MovingLeastSquares
+from nlsolve_fixed_point import Anderson, Broyden, Picard
+from nlsolve_globalization import Cubic, Energy, FullSteps, NonMonotone
 from nlsolve_homotopy import AsymptoticNumericalMethod
+from nlsolve_krylov import NewtonKrylov, TrustRegion
 from nlsolve_laws import PowerLaw
-from nlsolve_newton import ModifiedNewton, Newton
+from nlsolve_newton import ModifiedNewton, Newton, PseudoTransient
+from nlsolve_peers import ScipyRoot
 from nlsolve_refresh import EveryIteration, EveryM, Never, PoorContraction, RangeUnderOne
 from nlsolve_scenes import Channel, StirringTool
 from nlsolve_scenes.rings import Rings
+from pydantic import ValidationError
 
-from nlsolve import Cloud, Operators, SolveError, Status
+from nlsolve import Cloud, Operators, SolveError, Status, Step
 from nlsolve.columns import FIELDS, RUNS, STEPS
 from nlsolve.driver import Budget, StoppingTest
 from nlsolve.march import Progress, Record, march
@@ -81,6 +87,118 @@ def test_continuation_may_go_by_the_regularisation() -> None:
     other = march(setup(StirringTool(nodes=COARSE), 0.3)).summary
     assert row["status"] == "converged"
     assert row["velocity_error"] == pytest.approx(other["velocity_error"], rel=1e-5)
+
+
+class Watched(Newton):
+    """Newton's method, which tells where it was begun."""
+
+    def steps(self, problem: Any, tangent: Any, start: np.ndarray) -> Iterator[Step]:
+        BEGUN.append(start.copy())
+        yield from super().steps(problem, tangent, start)
+
+
+BEGUN: list[np.ndarray] = []
+
+
+def guesses(scene: StirringTool, **start: Any) -> list[np.ndarray]:
+    """Where the case's own method began."""
+    BEGUN.clear()
+    assert march(setup(scene, solver=Watched(), start=Start(**start))).summary["status"] == "converged"
+    return list(BEGUN)
+
+
+def test_a_perturbation_has_its_size_relative_to_the_velocity() -> None:
+    """‖guess − undisturbed guess‖₂ = ε ‖V‖₂: after continuation the state it led to, from rest the walls' velocity."""
+    scene = StirringTool(nodes=COARSE)
+    wall = 150.0 * np.sqrt(18)  # 18 nodes on the tool, 150 mm/s each
+    (rest,), (moved,) = guesses(scene, values=()), guesses(scene, values=(), perturbation=0.03, seed=1)
+    np.testing.assert_array_equal(rest, 0.0)
+    assert np.linalg.norm(moved) == pytest.approx(0.03 * wall, rel=1e-12)
+    (plain,), (moved,) = guesses(scene, values=(1.0,)), guesses(scene, values=(1.0,), perturbation=0.03)
+    whole = np.hypot(wall, np.linalg.norm(plain))
+    assert np.linalg.norm(moved - plain) == pytest.approx(0.03 * whole, rel=1e-12)
+
+
+def test_a_perturbation_follows_from_its_seed_and_the_increment() -> None:
+    scene = marching(3, motion_of_nodes="fixed")
+    still = guesses(scene)
+    one, again = (guesses(scene, perturbation=1e-3, seed=1) for _ in range(2))
+    other = guesses(scene, perturbation=1e-3, seed=2)
+    np.testing.assert_array_equal(one, again)
+    changes = [guess - plain for guess, plain in zip(one, still, strict=True)]
+    assert len(changes) == 3
+    assert np.linalg.norm(changes[0] - changes[1]) > np.linalg.norm(changes[0])  # drawn anew for each increment
+    assert np.linalg.norm(other[0] - one[0]) > 1e-3
+
+
+def test_a_perturbation_changes_the_way_and_not_the_solution() -> None:
+    plain = march(setup(marching(2, motion_of_nodes="fixed"), 0.3, record=times(2)))
+    moved = march(setup(marching(2, motion_of_nodes="fixed"), 0.3, record=times(2), start=Start(perturbation=0.01)))
+    assert plain.summary["factorizations"] == 0
+    assert moved.summary["factorizations"] > 0
+    assert plain.summary["start_factorizations"] == moved.summary["start_factorizations"]
+    gap = field(plain, 2 * DT)["u"].to_numpy() - field(moved, 2 * DT)["u"].to_numpy()
+    assert np.abs(gap).max() < 1e-6 * 150.0
+
+
+def test_without_a_perturbation_there_is_nothing_to_draw() -> None:
+    assert Start(seed=3) == Start()
+    assert Start(perturbation=0.1, seed=3) != Start(perturbation=0.1)
+    with pytest.raises(ValidationError, match="perturbation"):
+        Start(perturbation=-0.1, seed=3)
+
+
+RIVALS = [
+    (Newton(globalization=FullSteps()), EveryIteration()),
+    (Newton(), EveryIteration()),
+    (Newton(globalization=NonMonotone()), EveryIteration()),
+    (Newton(globalization=Cubic()), EveryIteration()),
+    (ModifiedNewton(), PoorContraction()),
+    (Anderson(), PoorContraction()),
+    (Broyden(), PoorContraction()),
+    (Picard(), EveryIteration()),
+    (NewtonKrylov(), PoorContraction()),
+    (TrustRegion(), PoorContraction()),
+    (PseudoTransient(), EveryIteration()),
+    (AsymptoticNumericalMethod(), RangeUnderOne()),
+    (AsymptoticNumericalMethod(extrapolation="pade", range="pade-pair"), RangeUnderOne()),
+    (ScipyRoot(), PoorContraction()),
+]
+
+
+@pytest.mark.parametrize(("solver", "refresh"), RIVALS)
+def test_from_rest_every_method_ends_in_the_solution_or_in_a_sentence(solver: Any, refresh: Any) -> None:
+    """n = 0.1324 without continuation: all work is the method's own, and what it ends in is verified."""
+    stop, start = StoppingTest(tolerance=1e-8), Start(values=())
+    parts: dict[str, Any] = {"discretizer": LinearTriangles(), "solver": solver, "refresh": refresh}
+    row = march(setup(StirringTool(nodes=COARSE), 0.1324, stop=stop, start=start, **parts)).summary
+    assert row["start_factorizations"] == row["start_residuals"] == 0
+    if row["status"] == "converged":
+        assert row["residual_norm"] <= 1e-8
+        assert row["velocity_error"] == pytest.approx(0.006126, abs=2e-5)  # triangles have one root only
+        assert row["factorizations"] > 0
+    else:
+        assert row["status"] in {"diverged", "stagnated", "budget spent", "non finite", "range exhausted"}
+        assert row["residual_norm"] > 1e-8
+        assert row["message"].startswith(Status[row["status"].upper().replace(" ", "_")].sentence)
+
+
+def test_a_potential_is_descended_from_rest_and_from_any_disturbed_start() -> None:
+    """Triangles make R the gradient of a convex potential: one root, and a search on the slope that cannot fail."""
+    parts: dict[str, Any] = {"discretizer": LinearTriangles(), "solver": Newton(globalization=Energy())}
+    starts = [Start(values=())] + [Start(values=(), perturbation=10.0, seed=seed) for seed in range(3)]
+    rows = [march(setup(StirringTool(nodes=COARSE), 0.1324, start=start, **parts)).summary for start in starts]
+    assert [row["status"] for row in rows] == ["converged"] * 4
+    errors = [row["velocity_error"] for row in rows]
+    np.testing.assert_allclose(errors, errors[0], rtol=1e-4)
+
+
+def test_a_potential_is_not_there_from_rest_either() -> None:
+    row = march(
+        setup(StirringTool(nodes=COARSE), solver=Newton(globalization=Energy()), start=Start(values=()))
+    ).summary
+    assert row["status"] == "not applicable"
+    assert "conservative discretizer" in row["message"]
 
 
 def test_a_start_by_an_unknown_field_is_a_mistake_of_the_caller() -> None:

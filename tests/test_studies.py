@@ -135,6 +135,39 @@ class TestSettings:
             "ε₀ = 10, a, scene.nodes.seed = 1",
         ]
 
+    def test_a_sweep_may_name_its_column(self, tmp_path):
+        text = EACH.replace("each = [", 'name = "attack"\neach = [', 1)
+        more = '[[sweep]]\nname = "place"\neach = [{ name = "a", scene.nodes = { kind = "random" } }]\n'
+        case, *_ = read(tmp_path, text=text + more).cases
+        assert list(case.parameters)[:2] == ["attack", "place"]
+        assert (case.parameters["attack"], case.parameters["place"], case.label) == ("as it is", "a", "as it is")
+        assert "variant" not in case.parameters
+        same = '[[sweep]]\nname = "attack"\neach = [{ name = "a", scene.nodes = { kind = "random" } }]\n'
+        assert read(tmp_path, text=text + same).cases[2].parameters["attack"] == "newton, a"
+        message = complaint(tmp_path, ('name = "newton", solver = { kind = "newton" }', 'name = "same"'), text=text)
+        assert "'as it is' and 'same' are one and the same case" in message
+        message = complaint(tmp_path, ('"place"', '"condition"'), text=text + more)
+        assert "line 22: sweep[1]: name = 'condition' is a column of the results already; choose another" in message
+        assert "is a column of the results already" in complaint(tmp_path, ('"place"', '"solved"'), text=text + more)
+        assert "sweep[1].name = '1st': " in complaint(tmp_path, ('"place"', '"1st"'), text=text + more)
+        message = complaint(tmp_path, ("[[sweep]]\n", '[[sweep]]\nname = "attack"\n'))
+        assert "name = 'attack' is for the names of each, and there are none; drop it" in message
+
+    def test_seeds_of_what_is_not_disturbed_are_one_case(self, tmp_path):
+        seeds = '[[sweep]]\ngrid = { "start.seed" = [0, 1, 2] }\n'
+        disturbed = EACH.replace('{ name = "as it is" }', '{ name = "as it is", "start.perturbation" = 0.1 }')
+        cases = read(tmp_path, text=disturbed + seeds).cases
+        assert [(case.parameters["variant"], case.parameters["start.seed"]) for case in cases] == [
+            ("as it is", 0),
+            ("as it is", 1),
+            ("as it is", 2),
+            ("ε₀ = 10", 0),
+            ("newton", 0),
+        ]
+        assert "start.seed = -1: should be greater than or equal to 0" in complaint(
+            tmp_path, ("[0, 1, 2]", "[-1]"), text=disturbed + seeds
+        )
+
     def test_tables_and_figures_may_use_the_variant(self, tmp_path):
         table = '[[table]]\nname = "t"\nrows = "variant"\nvalue = "seconds"\n'
         figure = '[[figure]]\nname = "f"\nkind = "map"\nx = "scene.side"\ny = "variant"\n'

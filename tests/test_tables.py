@@ -203,12 +203,43 @@ def test_false_successes_are_a_table():
     assert build(lenient, judged()).cells.loc["d", "outcome"] == "right"
 
 
+def test_shares_solved_and_their_intervals():
+    """By hand, z² = 2.7055: 2 of 2 from N/(N + z²) = 0.425; 1 of 3: (0.7843 ± 0.6354)/1.9018. z² = 0.455: 1/1.455."""
+    table = build(spec(rows="solver.kind", columns=[], value="solved"), judged().assign(residual_norm=1e-9))
+    assert table.words["solved"].to_dict() == {"anm": "1.00 [0.43, 1.00]", "newton": "0.33 [0.08, 0.75]"}
+    assert table.csv() == 'solver.kind,solved\nanm,"1.00 [0.43, 1.00]"\nnewton,"0.33 [0.08, 0.75]"\n'
+    table = build(
+        spec(rows="solver.kind", columns="solver.exact", value="solved", format=".0%", interval=0.5, accepted=0.3),
+        judged().assign(residual_norm=1e-9),
+    )
+    assert table.words.to_numpy().tolist() == [
+        ["100% [69%, 100%]", "100% [69%, 100%]"],
+        ["50% [28%, 72%]", "100% [69%, 100%]"],
+    ]
+    assert table.words.loc["newton", True] == "50% [28%, 72%]"
+
+
+def test_what_no_one_verified_is_not_solved():
+    table = build(spec(rows="solver.kind", columns=[], value="solved"), judged())
+    assert table.words["solved"].tolist() == ["0.00 [0.00, 0.57]", "0.00 [0.00, 0.47]"]
+    solved = spec(rows="variant", columns=[], value="seconds", where={"solved": True})
+    assert build(solved, judged().assign(residual_norm=1e-9)).cells.index.tolist() == ["a", "b", "c"]
+
+
+def test_where_with_several_values():
+    table = build(spec(where={"solver.order": [20, 10, 7], "solver.tolerance": [1e-8]}), runs())
+    assert table.cells.to_numpy().tolist() == [[40.0], [20.0]]
+    with pytest.raises(StudyError, match=r"no case has these values: solver\.order = \[7, 8\]"):
+        build(spec(where={"solver.order": [7, 8]}), runs())
+
+
 def test_before_a_run_outcomes_counts_and_winners_are_unknown_but_not_wrong():
     cases = [{"solver.order": 1}, {"solver.order": 1}]
     for fields in (
         {"columns": "outcome", "value": [], "count": True},
         {"columns": [], "value": "seconds", "cheapest": {}},
         {"columns": [], "value": [], "count": True},
+        {"columns": [], "value": "solved"},
     ):
         assert check(spec(**fields), cases) == []
     (problem,) = check(spec(columns=[], value="seconds", cheapest={"cost": "secnds"}), cases)
@@ -228,7 +259,11 @@ def test_a_kept_declaration_reads_back_the_same():
         ({"count": True, "value": [], "cheapest": {}}, "drop cheapest"),
         ({"value": []}, "value is required, and missing"),
         ({"rows": []}, "rows is required, and missing"),
-        ({"cheapest": {}, "paper": {"source": "s", "values": [[1]]}}, "not with cheapest"),
+        ({"cheapest": {}, "paper": {"source": "s", "values": [[1]]}}, "not with cheapest or shares"),
+        ({"value": "solved", "paper": {"source": "s", "values": [[1]]}}, "not with cheapest or shares"),
+        ({"value": ["solved", "seconds"]}, 'value = "solved" shows shares.*drop the other values'),
+        ({"value": "solved", "cheapest": {}}, 'value = "solved" shows shares.*drop cheapest'),
+        ({"interval": 1.0}, "less than 1"),
         ({"cheapest": {"within": []}}, "at least 1 item"),
         ({"accepted": 0}, "greater than 0"),
     ],

@@ -1,4 +1,5 @@
-"""Figures a study declares: curves, maps and trades of runs, curves of steps, clouds, profiles and fields, for print.
+"""Figures a study declares, for print: curves, maps, trades and solved problems of runs, curves of steps, clouds,
+profiles and fields.
 
 A figure is a validated value like everything else in a study; `draw` turns it and the result frames into a
 `matplotlib.figure.Figure` without touching pyplot, `save` writes it as PNG and PDF, the same bytes every time.
@@ -20,18 +21,21 @@ from nlsolve.figures.field import FieldFigure
 from nlsolve.figures.line import LineFigure
 from nlsolve.figures.map import MapFigure
 from nlsolve.figures.profile import ProfileFigure
+from nlsolve.figures.solved import DataFigure, PerformanceFigure
 from nlsolve.figures.style import COLUMN, DOTS_PER_INCH, STYLE
 from nlsolve.figures.trade import TradeFigure
 
 __all__ = [
     "BaseFigure",
     "CloudFigure",
+    "DataFigure",
     "FieldFigure",
     "FigureError",
     "FigureSpec",
     "Frames",
     "LineFigure",
     "MapFigure",
+    "PerformanceFigure",
     "ProfileFigure",
     "TradeFigure",
     "draw",
@@ -39,7 +43,8 @@ __all__ = [
 ]
 
 FigureSpec = Annotated[
-    LineFigure | MapFigure | TradeFigure | CloudFigure | ProfileFigure | FieldFigure, Field(discriminator="kind")
+    LineFigure | MapFigure | TradeFigure | PerformanceFigure | DataFigure | CloudFigure | ProfileFigure | FieldFigure,
+    Field(discriminator="kind"),
 ]
 """What a study's `[[figure]]` may be."""
 

@@ -30,7 +30,7 @@ from nlsolve.figures.style import (
     legend_outside,
     letters,
 )
-from nlsolve.outcomes import ACCEPTED, VARIANT, WRONG, Run, doubt, is_error, number, outcome, percent, telling
+from nlsolve.outcomes import ACCEPTED, WRONG, Run, doubt, is_error, names_settings, number, outcome, percent, telling
 from nlsolve.status import Status
 
 MOST_CELLS = 2000
@@ -141,9 +141,9 @@ class MapFigure(BaseFigure):
             for label in axes.get_xticklabels():
                 label.set(horizontalalignment="left", rotation_mode="anchor")
         axes.xaxis.set_label_position("top")
-        if len(self.x) == 1 and self.x[0] != VARIANT:
+        if len(self.x) == 1 and not names_settings(self.x[0]):
             axes.set_xlabel(axis_label(self.x, "runs"))
-        if len(self.y) == 1 and self.y[0] != VARIANT:
+        if len(self.y) == 1 and not names_settings(self.y[0]):
             axes.set_ylabel(axis_label(self.y, "runs"))
         for spine in axes.spines.values():
             spine.set_visible(False)

@@ -12,7 +12,7 @@ from pydantic import Field
 from nlsolve import Globalization, NonlinearProblem, Search
 
 SUFFICIENT_DECREASE = 1e-4  # of ‖R‖, as part of what is promised per unit of step length (Armijo 1966)
-OVER = 1e100  # a ratio of residuals above this counts as this: its square is still a number
+OVER = 1e30  # a ratio of residuals above this counts as this: its fourth power is still a number
 SHORTEST, LONGEST = 0.1, 0.5  # the next length over the last one (Dennis & Schnabel 1983, A6.3.1)
 
 Trials = list[tuple[float, float]]

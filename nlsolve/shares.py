@@ -1,0 +1,51 @@
+"""Share of problems solved, within what cost, and how certain it is. A failure costs ∞, and stays in every share."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.special import ndtri
+
+from nlsolve.series import Array
+
+
+def ratios(costs: Array) -> Array:
+    """r_sp = t_sp/min_s t_sp, shape (S, P): cost of strategy s over the least for problem p; ∞ where t_sp is.
+
+    Dolan & Moré (2002), whose performance profile is the share of problems with r_sp ≤ τ. Costs are positive.
+    """
+    if not (costs > 0.0).all():
+        raise ValueError("costs should be positive, and ∞ where a strategy failed")
+    return np.divide(costs, costs.min(axis=0), out=np.full(costs.shape, np.inf), where=np.isfinite(costs))
+
+
+def within(costs: Array, limits: Array) -> Array:
+    """|{p : t_sp ≤ limit}|/P, shape (S, T), of costs (S, P) and finite limits (T,).
+
+    Of costs themselves a data profile (Moré & Wild 2009), of their `ratios` a performance profile.
+    """
+    return (costs[:, :, None] <= limits).mean(axis=1)
+
+
+def band(costs: Array, limits: Array, interval: float, samples: int, seed: int) -> tuple[Array, Array]:
+    """Ends (S, T) of the interval that holds this part of the shares when the P problems are drawn anew, P at a time.
+
+    The percentile bootstrap (Efron 1979) over problems; all strategies are given the same draws.
+    """
+    problems = costs.shape[1]
+    drawn = np.random.default_rng(seed).multinomial(problems, np.full(problems, 1.0 / problems), samples) / problems
+    tails = (0.5 - 0.5 * interval, 0.5 + 0.5 * interval)
+    ends = [np.quantile(drawn @ (row[:, None] <= limits), tails, axis=0) for row in costs]
+    low, high = np.clip(np.stack(ends, axis=1), 0.0, 1.0)
+    return low, high
+
+
+def wilson(solved: int, runs: int, interval: float) -> tuple[float, float]:
+    """(p + z²/2N ± z √(p (1 − p)/N + z²/4N²))/(1 + z²/N), p = solved/N: interval of the chance of success.
+
+    The score interval (Wilson 1927). A bootstrap is certain of success after five of five; this is not.
+    """
+    z, share = float(ndtri(0.5 + 0.5 * interval)), solved / runs
+    middle = share + z**2 / (2 * runs)
+    half = z * np.sqrt(share * (1.0 - share) / runs + z**2 / (4 * runs**2))
+    low, high = (middle - half) / (1.0 + z**2 / runs), (middle + half) / (1.0 + z**2 / runs)
+    return max(float(low), 0.0), min(float(high), 1.0)
