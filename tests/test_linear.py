@@ -168,6 +168,52 @@ class TestDense:
         assert "20001 unknowns take 3 GB: choose a sparse linear solver" in str(error)
 
 
+class TestLentOrder:
+    """Columns are ordered once for a pattern, where ordering them is what costs."""
+
+    @pytest.fixture
+    def specifications(self, monkeypatch: pytest.MonkeyPatch) -> list[str]:
+        seen, splu = list[str](), scipy.sparse.linalg.splu
+        monkeypatch.setattr(scipy.sparse.linalg, "splu", lambda *a, **k: seen.append(k["permc_spec"]) or splu(*a, **k))
+        return seen
+
+    @pytest.mark.parametrize("ordering", ["mmd-ata", "colamd"])
+    def test_the_order_lent_gives_the_same_factors_without_ordering(
+        self, ordering: Any, specifications: list[str]
+    ) -> None:
+        first, following = benchmark.tangents({"kind": "mls"}, 0.75)
+        linear = SuperLU(ordering=ordering)
+        lent = linear.factorize(first)
+        factors = linear.factorize(following, linear.factorize(first, lent))
+        alone = linear.factorize(following)
+        own = ordering.replace("-", "_").upper()
+        assert specifications == [own, "NATURAL", "NATURAL", own]
+        assert factors.fill == alone.fill
+        assert factors.ordering == alone.ordering == ordering
+        rhs = np.cos(np.arange(first.shape[0]))
+        np.testing.assert_allclose(factors.solve(rhs), alone.solve(rhs), rtol=1e-9)
+        assert factors.condition() == pytest.approx(alone.condition(), rel=1e-9)
+
+    def test_another_pattern_is_ordered_anew(self, specifications: list[str]) -> None:
+        linear = SuperLU(ordering="colamd")
+        linear.factorize(tangent("conservative"), linear.factorize(tangent()))
+        assert specifications == ["COLAMD", "COLAMD"]
+
+    def test_an_ordering_that_costs_nothing_is_found_anew(self, specifications: list[str]) -> None:
+        linear = SuperLU(ordering="mmd-at-plus-a")
+        linear.factorize(tangent(), linear.factorize(tangent()))
+        assert specifications == ["MMD_AT_PLUS_A", "MMD_AT_PLUS_A"]
+
+    def test_auto_keeps_the_ordering_that_was_settled_on_and_its_order(self, specifications: list[str]) -> None:
+        lent = SuperLU(ordering="colamd").factorize(tangent())
+        factors = SuperLU().factorize(tangent(), lent)
+        assert specifications == ["COLAMD", "NATURAL"]
+        assert (factors.ordering, factors.attempts) == ("colamd", 1)
+
+    def test_factors_of_a_stranger_lend_nothing(self) -> None:
+        assert SuperLU().factorize(tangent(), Lapack().factorize(tangent())).attempts == 3
+
+
 class TestWeakPivoting:
     """Diagonals of 0.003 pass as pivots of `mmd-at-plus-a` (threshold 0.001): elements grow, digits are lost."""
 
