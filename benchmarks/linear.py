@@ -3,8 +3,8 @@
     python benchmarks/linear.py [--large] [repeats]
 
 Prints, for every form of the discretisation on the 2015 paper's 1780 nodes (--large: also on 4854 and on 19133), a row
-a linear solver: median processor time [ms] of the first factorisation and of a later one, to which the first lends its
-ordering or analysis; of one solve; both over those of SuperLU in the same run; the pairs of triangular solves in it;
+a linear solver: processor time [ms] of the first factorisation; the median of a later one, to which the first lends its
+ordering or analysis, and of one solve; both over SuperLU's in the same run; the pairs of triangular solves in a solve;
 entries of the factors; ‖b − A x‖/‖b‖. A linear solver whose library is absent is left out, and named.
 """
 
@@ -61,29 +61,29 @@ def tangents(form: dict[str, Any], spacing: float) -> tuple[Any, Any]:
     return flow.jacobian(u + waves[0]), flow.jacobian(u + waves[1])
 
 
-def processor_time(work: Callable[[], object], repeats: int) -> float:
-    """Median milliseconds of all threads over `repeats` runs; other programs on the machine hardly count."""
+def processor_time(work: Callable[[], Any], repeats: int) -> tuple[Any, float]:
+    """Result, and median milliseconds of all threads over `repeats` runs; other programs hardly count."""
     spent = []
     for _ in range(repeats):
         begun = time.process_time()
-        work()
+        result = work()
         spent.append(time.process_time() - begun)
-    return 1e3 * statistics.median(spent)
+    return result, 1e3 * statistics.median(spent)
 
 
 def row(linear: nlsolve.LinearSolver, first: Any, following: Any, repeats: int) -> dict[str, Any]:
     """What one linear solver costs on two matrices of one march; why not, where it fails."""
     rhs = following @ np.random.default_rng(0).standard_normal(following.shape[0])
     try:
-        lent = linear.factorize(first)
-        factors = linear.factorize(following, lent)
-        x = factors.solve(rhs)
+        lent, alone = processor_time(lambda: linear.factorize(first), 1)
+        factors, factor = processor_time(lambda: linear.factorize(following, lent), repeats)
+        x, solve = processor_time(lambda: factors.solve(rhs), 3 * repeats)
     except nlsolve.SolveError as error:
         return {"failure": str(error)}
     return {
-        "first": processor_time(lambda: linear.factorize(first), repeats),
-        "factor": processor_time(lambda: linear.factorize(following, lent), repeats),
-        "solve": processor_time(lambda: factors.solve(rhs), 3 * repeats),
+        "first": alone,
+        "factor": factor,
+        "solve": solve,
         "solves": factors.solves,
         "fill": factors.fill,
         "residual": np.linalg.norm(rhs - following @ x) / np.linalg.norm(rhs),
