@@ -18,7 +18,7 @@ from nlsolve import Component, Factors, LinearSolver, SolveError, Status, hookim
 try:
     import rslab
 except ImportError:  # an extra: nlsolve[rslab]
-    rslab = None  # type: ignore[assignment]
+    rslab = None
 else:
     rslab.set_log_level("error")  # what it warns of on standard error, a singular matrix, is raised as well
 
