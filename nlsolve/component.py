@@ -23,6 +23,9 @@ class Component(BaseModel):
         """A copy with some fields changed, validated like a new one."""
         return type(self).model_validate({**self.model_dump(), **changes})
 
+    absent: ClassVar[str | None] = None
+    """Why the kind cannot be used here, and the way out: "needs the library x: pip install …"; None when it can."""
+
     @classmethod
     def kind_name(cls) -> str:
         """The name by which studies ask for this class."""

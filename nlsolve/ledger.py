@@ -134,14 +134,21 @@ def factorize_counted(linear: LinearSolver, sealed: SealedMatrix, previous: Fact
 
 
 def solve_counted(factors: Factors, sealed: SealedMatrix, rhs: Array, refinement: int, ledger: Ledger) -> Array:
-    """x with A x = rhs, and `refinement` steps x += A⁻¹ (rhs − A x), every triangular solve counted."""
-    with ledger.entry("triangular_solve"):
-        x = factors.solve(rhs)
+    """x with A x = rhs, and `refinement` steps x += A⁻¹ (rhs − A x), every solve and product counted."""
+    x = _solve_entered(factors, rhs, ledger)
     for _ in range(refinement):
-        defect = rhs - sealed @ x
-        with ledger.entry("triangular_solve"):
-            x = x + factors.solve(defect)
+        x = x + _solve_entered(factors, rhs - sealed @ x, ledger)
     return x
+
+
+def _solve_entered(factors: Factors, rhs: Array, ledger: Ledger) -> Array:
+    """One `solve` with everything that it says it took, also when it fails."""
+    with ledger.entry("triangular_solve"):
+        try:
+            return factors.solve(rhs)
+        finally:
+            ledger.counts["triangular_solve"] += factors.solves - 1
+            ledger.counts["matrix_product"] += factors.products
 
 
 class Audited:

@@ -20,10 +20,17 @@ class Factors(ABC):
     """Entries stored in the factors."""
     attempts: int = 1
     """Factorisations carried out to obtain these factors, trials of orderings included: all are counted."""
+    solves: int = 1
+    """Pairs of triangular solves that the last `solve` carried out: one, but for an iteration."""
+    products: int = 0
+    """Products with the matrix that the last `solve` carried out."""
 
     @abstractmethod
     def solve(self, rhs: Array) -> Array:
-        """x with A x = rhs: one forward and one backward triangular solve, nothing hidden."""
+        """x with A x = rhs: one forward and one backward triangular solve, or as many as `solves` owns up to.
+
+        Raises SolveError when an iteration does not reach the accuracy it was asked for.
+        """
 
     def condition(self) -> float | None:
         """An estimate of ‖A‖₁ ‖A⁻¹‖₁, asked for off the clock; None when the library gives no transposed solves."""
@@ -39,7 +46,7 @@ class LinearSolver(Component, ABC):
 
     @abstractmethod
     def factorize(self, matrix: Any, previous: Factors | None = None) -> Factors:
-        """Factors of a sparse matrix; `previous` ones of a like pattern may lend their ordering.
+        """Factors of a sparse matrix; `previous` ones of a like pattern may lend their ordering or their analysis.
 
-        Raises SolveError (singular tangent) when the matrix is singular to working precision.
+        Raises SolveError: singular tangent, when the matrix is singular to working precision; non-finite.
         """

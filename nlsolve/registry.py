@@ -128,7 +128,7 @@ class Registry:
         return {
             kind: offers[0].cls
             for (offered_noun, kind), offers in sorted(self._offers.items(), key=lambda item: item[0])
-            if offered_noun == noun and len(offers) == 1
+            if offered_noun == noun and len(offers) == 1 and offers[0].cls.absent is None
         }
 
     def complaint(self, noun: str, kind: object) -> str | None:
@@ -137,6 +137,8 @@ class Registry:
         if isinstance(kind, str) and kind in classes:
             return None
         offers = self._offers.get((noun, kind), []) if isinstance(kind, str) else []
+        if len(offers) == 1:
+            return f"{noun} {kind!r} {offers[0].cls.absent}"
         if offers:
             both = " and ".join(offer.source for offer in offers)
             return f"{noun} {kind!r} is offered by {both}: uninstall all but one"
@@ -177,7 +179,7 @@ class Registry:
         for (noun, kind), offers in sorted(
             self._offers.items(), key=lambda item: (order.index(item[0][0]), item[0][1])
         ):
-            failure = None if len(offers) == 1 else self.complaint(noun, kind)
+            failure = self.complaint(noun, kind)
             rows += [PluginRow(noun, kind, offer.source, _parameters(offer.cls), failure) for offer in offers]
         return rows + self._failures
 

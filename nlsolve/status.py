@@ -16,6 +16,7 @@ class Status(Enum):
     NON_FINITE = "a residual, a coefficient or an iterate was not a finite number"
     OUT_OF_DOMAIN = "the method reached a finite state where the residual has no finite value"
     SINGULAR_TANGENT = "a tangent could not be factorised: it is singular to working precision"
+    UNSOLVED_TANGENT = "a linear system with the tangent was not solved to the accuracy asked for"
     RANGE_EXHAUSTED = "the range of the series fell to nothing before the end of the path"
     BAD_CLOUD = "the nodes no longer carry a discretisation: coincident nodes or supports without enough neighbours"
     ILL_CONDITIONED = "the local systems of the discretisation are singular to working precision"

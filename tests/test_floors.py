@@ -27,7 +27,7 @@ FLOORS = [
 FLOOR = {name: number for number, names in enumerate(FLOORS) for name in names.split()}
 MODULES = sorted(HOUSE.rglob("*.py"))
 PLUGIN_MODULES = sorted(PLUGINS.rglob("*.py"))
-LIBRARIES = {"nlsolve", "numpy", "scipy", "pydantic", "meshio"}
+LIBRARIES = {"nlsolve", "numpy", "scipy", "pydantic", "meshio", "rslab"}
 
 
 def imports(path: Path) -> Iterator[tuple[str, list[str]]]:

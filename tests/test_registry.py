@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import importlib.metadata
 import sys
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 
 import pytest
 from fakes import COMPONENTS, Homotopy, Honey, Newton, Plugin, registry_of
@@ -35,6 +35,13 @@ class Unfinished(NonlinearSolver):
     """No steps."""
 
     kind: Literal["unfinished"] = "unfinished"
+
+
+class Absent(Newton):
+    """A solver whose library is not installed."""
+
+    kind: Literal["absent"] = "absent"
+    absent: ClassVar[str | None] = "needs the library absent: pip install absent"
 
 
 class WithoutHook:
@@ -97,6 +104,17 @@ def test_union_of_many_or_one_asks_for_a_kind(classes):
         section.validate_python(3)
     with pytest.raises(ValidationError, match="no such solver"):
         section.validate_python({"kind": ["newton"]})
+
+
+def test_a_kind_without_its_library_is_refused_in_its_own_words():
+    registry = registry_of(Newton, Absent)
+    sentence = "solver 'absent' needs the library absent: pip install absent"
+    assert registry.classes("solver") == {"newton": Newton}
+    assert failures(registry) == [sentence]
+    with pytest.raises(ValidationError, match=sentence):
+        TypeAdapter(registry.union("solver")).validate_python({"kind": "absent"})
+    with pytest.raises(ValidationError, match=r"no such solver; did you mean 'newton'\? installed: newton \["):
+        TypeAdapter(registry.union("solver")).validate_python({"kind": "newtn"})
 
 
 def test_union_of_nothing():
