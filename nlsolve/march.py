@@ -13,7 +13,7 @@ from pydantic import Field
 from scipy.spatial import cKDTree
 
 from nlsolve.audit import audit
-from nlsolve.columns import STEPS
+from nlsolve.columns import REPORTED, STEPS
 from nlsolve.component import Component
 from nlsolve.discretizers import Discretizer, Operators
 from nlsolve.driver import Budget, Outcome, StoppingTest, solve
@@ -319,6 +319,11 @@ class _March:
             places = np.full_like(self.initial.nodes, np.nan) if self.markers is None else self.markers.places
             self.snapshots.append(fields.assign(marker_x=places[:, 0], marker_y=places[:, 1]))
 
+    def reported(self, name: str) -> float | None:
+        """What the method's library says in all; None where it says nothing."""
+        said = [row[name] for row in self.rows if name in row]
+        return sum(said) if said else None
+
     def record(self, status: Status, detail: str) -> Record:
         """The row of the case, whatever its ending; what is measured on fields is of the last solved increment."""
         ledger, start = self.ledger, self.start_ledger
@@ -344,6 +349,7 @@ class _March:
             "jacobians": ledger.counts["jacobian"],
             "residuals": ledger.counts["residual"],
             "series_orders": ledger.counts["series_order"],
+            **{name: self.reported(name) for name in REPORTED},
             "start_factorizations": start.counts["factorization"],
             "start_triangular_solves": start.counts["triangular_solve"],
             "start_residuals": start.counts["residual"],

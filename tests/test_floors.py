@@ -17,7 +17,7 @@ PLUGINS = HOUSE.parent / "plugins"
 
 FLOORS = [
     "series component status columns",
-    "laws scenes discretizers linear problems solvers",
+    "laws scenes discretizers linear problems assembled solvers",
     "flow tangent pressure motion march measures audit ledger driver",
     "hookspecs registry",
     "studies locate errors outcomes condense sweeps runner store tables papers report plan diagnose figures",
@@ -26,7 +26,7 @@ FLOORS = [
 FLOOR = {name: number for number, names in enumerate(FLOORS) for name in names.split()}
 MODULES = sorted(HOUSE.rglob("*.py"))
 PLUGIN_MODULES = sorted(PLUGINS.rglob("*.py"))
-LIBRARIES = {"nlsolve", "numpy", "scipy", "pydantic", "meshio"}
+LIBRARIES = {"nlsolve", "numpy", "scipy", "pydantic", "meshio", "mpi4py", "petsc4py", "sundials4py"}
 
 
 def imports(path: Path) -> Iterator[tuple[str, list[str]]]:

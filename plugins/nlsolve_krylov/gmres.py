@@ -51,7 +51,7 @@ def gmres(product: Map, precondition: Map, b: np.ndarray, tolerance: float, most
         hessenberg[k + 1, k] = np.linalg.norm(w)
         e_1 = np.zeros(k + 2)
         e_1[0] = size
-        y = np.asarray(np.linalg.lstsq(hessenberg[: k + 2, : k + 1], e_1)[0])
+        y = np.asarray(np.linalg.lstsq(hessenberg[: k + 2, : k + 1], e_1, rcond=None)[0])
         left = float(np.linalg.norm(e_1 - hessenberg[: k + 2, : k + 1] @ y))
         if left <= tolerance or hessenberg[k + 1, k] <= np.finfo(float).eps * length:
             break
