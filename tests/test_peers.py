@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gc
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -75,7 +76,7 @@ def reported(outcome: Outcome, name: str) -> float:
     ],
 )
 def test_an_absent_library_is_a_row_with_the_way_out(
-    module: Any, name: str, solver: NonlinearSolver, sentence: str, monkeypatch: pytest.MonkeyPatch
+    module: Any, name: str, solver: NonlinearSolver, sentence: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(module, name, None)
     study = {
@@ -85,10 +86,13 @@ def test_an_absent_library_is_a_row_with_the_way_out(
         "discretizer": {"kind": "mls"},
         "sweep": [{"grid": {"solver": [solver, {"kind": "newton"}]}}],
     }
-    runs = nlsolve.run(study).runs
+    runs = nlsolve.run(study, tmp_path).runs
     assert list(runs["status"]) == ["not applicable", "converged"]
     assert sentence in runs["message"][0]
     assert "or choose another solver" in runs["message"][0]
+    again: list[bool] = []
+    nlsolve.run(study, tmp_path, listen=lambda event: again.append(event.resumed) if event.run is not None else None)
+    assert again == [False, True]  # the library may have been installed since
 
 
 # What is reported, and what was observed.
