@@ -2,6 +2,7 @@
 
 from importlib.metadata import PackageNotFoundError, version
 
+from nlsolve.assembled import AssembledOnce
 from nlsolve.component import Component
 from nlsolve.discretizers import Discretizer, Operators
 from nlsolve.globalization import Globalization, Search
@@ -25,6 +26,7 @@ except PackageNotFoundError:  # a checkout on the path, not installed: no plugin
     __version__ = "not installed"
 
 __all__ = [
+    "AssembledOnce",
     "Cloud",
     "Component",
     "ConstitutiveLaw",

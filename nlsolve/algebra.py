@@ -14,7 +14,7 @@ from nlsolve.compression import Compression
 from nlsolve.driver import Budget, Outcome, StoppingTest, solve
 from nlsolve.ledger import Ledger
 from nlsolve.linear import LinearSolver
-from nlsolve.march import Progress, Record
+from nlsolve.march import Progress, Record, reported
 from nlsolve.problems import Expansion, NonlinearProblem
 from nlsolve.series import Array, Series
 from nlsolve.solvers import NonlinearSolver, RefreshRule
@@ -93,7 +93,11 @@ def solve_system(setup: AlgebraicSetup, listen: Callable[[Progress], None] | Non
         "increments": int(solved),
         "iterations": max(0, len(outcome.steps) - 1),
         "branches": tangent.branches,
+        "said_converged_but_is_not": int(outcome.claimed_wrongly),
+        "said_failed_but_is": int(outcome.denied_wrongly),
+        **outcome.blame,
         **ledger.work(),
+        **reported(outcome.steps),
         "seconds_all": ledger.seconds["method"] + ledger.seconds["operators"],
         **tangent.facts(),
         "residual_norm": outcome.residual_norm,

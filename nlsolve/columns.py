@@ -2,6 +2,15 @@
 
 from __future__ import annotations
 
+REPORTED: dict[str, str] = {
+    "reported_iterations": "iterations that the library behind a method says it took",
+    "reported_residuals": "residuals that it says it evaluated",
+    "reported_jacobians": "Jacobians that it says it evaluated",
+    "reported_factorizations": "set-ups of its preconditioner, here K*, that it says it asked for",
+    "reported_triangular_solves": "solves with it that it says it asked for",
+}
+"""What a library says of its own work, to be held against the counts beside it; NaN where it says nothing."""
+
 RUNS: dict[str, str] = {
     "case": "identity of the case: a digest of its validated components",
     "status": "how the case ended, in a word or two",
@@ -29,6 +38,7 @@ RUNS: dict[str, str] = {
     "jacobians": "Jacobians assembled during the march",
     "residuals": "residuals evaluated by the method during the march",
     "series_orders": "Taylor coefficients of the residual computed during the march",
+    **REPORTED,
     "start_factorizations": "matrices factorised on the way to the first state",
     "start_triangular_solves": "pairs of triangular solves on the way to the first state",
     "start_residuals": "residuals evaluated on the way to the first state",
@@ -101,7 +111,8 @@ STEPS: dict[str, str] = {
     "(a new branch is cheaper than more orders)",
     "length": "step length of the line search, or the part of the path a series advanced",
     "contraction": "residual norm over that of the step before, as the refresh rule is told (newton-krylov: per inner "
-    "iteration; scipy-root: per value of R)",
+    "iteration; petsc-snes, kinsol: per solve with K*; scipy-root: per value of R)",
+    **REPORTED,
     "seconds": "time inside the method so far in the march [s]",
     "probe_x": "place of the probe node, x [mm] (accepted steps)",
     "probe_y": "the same, y [mm]",

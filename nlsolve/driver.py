@@ -104,7 +104,7 @@ def solve(
 ) -> Outcome:
     """Take steps of `solver` on `problem` from `start` until the stopping test, the budget or a failure ends it."""
     audited = Audited(problem, ledger)
-    scale = problem.scale(start)
+    scale = audited.scale(start)
     before, rows = start, list[dict[str, Any]]()
     residual_norm = np.inf
     claimed = denied = False

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import time
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any
@@ -157,10 +157,16 @@ class Audited:
     def __init__(self, problem: NonlinearProblem, ledger: Ledger) -> None:
         self._problem = problem
         self._last: tuple[Array, Array] | None = None
-        self.view = _view(problem, ledger, self._remember)
+        self._scales: dict[bytes, float] = {}
+        self.view = _view(problem, ledger, self._remember, self._scales)
 
     def _remember(self, u: Array, residual: Array) -> None:
         self._last = (u.copy(), residual.copy())
+
+    def scale(self, u: Array) -> float:
+        """What ‖R‖ is compared with, uncounted. A method may read it at this u for nothing, as it may its tolerance."""
+        self._scales[u.tobytes()] = self._problem.scale(u)
+        return self._scales[u.tobytes()]
 
     def residual(self, u: Array) -> Array:
         """R(u), uncounted; not evaluated again where the method has just evaluated it at this very state."""
@@ -169,7 +175,7 @@ class Audited:
         return self._problem.residual(u)
 
 
-def _view(problem: NonlinearProblem, ledger: Ledger, remember: Any) -> NonlinearProblem:
+def _view(problem: NonlinearProblem, ledger: Ledger, remember: Any, scales: Mapping[bytes, float]) -> NonlinearProblem:
     """The problem as a method sees it. What is behind it lives in these closures, not in attributes."""
 
     class CountedExpansion(Expansion):
@@ -231,6 +237,8 @@ def _view(problem: NonlinearProblem, ledger: Ledger, remember: Any) -> Nonlinear
             return CountedExpansion(expansion)
 
         def scale(self, u: Array) -> float:
+            if u.tobytes() in scales:
+                return scales[u.tobytes()]
             with ledger.entry("residual"):  # it costs what a residual costs
                 return problem.scale(u)
 

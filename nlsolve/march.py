@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -11,7 +11,7 @@ import pandas as pd
 from scipy.spatial import cKDTree
 
 from nlsolve.audit import audit
-from nlsolve.columns import STEPS
+from nlsolve.columns import REPORTED, STEPS
 from nlsolve.discretizers import Discretizer, Operators
 from nlsolve.driver import Budget, Outcome, StoppingTest, solve
 from nlsolve.estimate import discretization_error
@@ -69,6 +69,12 @@ class Record:
     summary: dict[str, Any]
     steps: pd.DataFrame
     fields: pd.DataFrame = field(default_factory=pd.DataFrame)
+
+
+def reported(rows: Sequence[Mapping[str, Any]]) -> dict[str, float | None]:
+    """What the method's library says it did, over all rows of `steps`; None where it says nothing."""
+    said = {name: [row[name] for row in rows if name in row] for name in REPORTED}
+    return {name: sum(numbers) if numbers else None for name, numbers in said.items()}
 
 
 def march(setup: Setup, listen: Callable[[Progress], None] | None = None) -> Record:
@@ -373,6 +379,7 @@ class _March:
             "branches": self.tangent.branches,
             "validity_time": validity,
             **ledger.work(),
+            **reported(self.rows),
             "start_factorizations": start.counts["factorization"],
             "start_triangular_solves": start.counts["triangular_solve"],
             "start_residuals": start.counts["residual"],

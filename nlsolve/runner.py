@@ -86,7 +86,8 @@ def run(
 ) -> Results:
     """Run every case of a study that has not been run before, and keep the results in `out` (None: in memory).
 
-    An interruption loses the running case only; the same call again does the rest. Crashed cases are tried again.
+    An interruption loses the running case only; the same call again does the rest. Cases that crashed, or whose method
+    did not apply, are tried again.
     """
     study = _study(study, overrides, quick)
     store = None if out is None else Store(Path(out), study)

@@ -21,6 +21,7 @@ from nlsolve.studies import Study
 from nlsolve.tables import TableSpec
 
 STUDY, CASES = "study.json", "cases"
+TRIED_AGAIN = {Status.CRASHED.word, Status.NOT_APPLICABLE.word}
 
 
 class StoreError(ValueError):
@@ -62,12 +63,14 @@ class Store:
         self.write_text(STUDY, json.dumps(identity, indent=1, ensure_ascii=False) + "\n")
 
     def load(self, case: str) -> Part | None:
-        """The part of a finished case; None when there is none, it is damaged, or the case crashed."""
+        """The part of a finished case; None when there is none, it is damaged, the case crashed, or its method did not
+        apply: what it lacked may have been installed since.
+        """
         try:
             runs, steps, fields = (pd.read_parquet(self._part(case, name)) for name in ("runs", "steps", "fields"))
         except (OSError, ValueError, ArrowException):
             return None
-        if list(runs.get("case", [])) != [case] or runs["status"].iloc[0] == Status.CRASHED.word:
+        if list(runs.get("case", [])) != [case] or runs["status"].iloc[0] in TRIED_AGAIN:
             return None
         row = next(runs.itertuples(index=False))
         return Part(dict(zip(runs.columns, row, strict=True)), steps, fields)

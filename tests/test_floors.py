@@ -17,7 +17,7 @@ PLUGINS = HOUSE.parent / "plugins"
 
 FLOORS = [
     "series component status columns",
-    "laws scenes systems discretizers linear problems predictors globalization solvers",
+    "laws scenes systems discretizers linear problems assembled predictors globalization solvers",
     "flow algebra compression tangent pressure motion start march measures estimate audit ledger driver",
     "hookspecs registry nested",
     "studies locate errors outcomes shares condense sweeps references runner store tables papers report plan diagnose "
@@ -27,7 +27,7 @@ FLOORS = [
 FLOOR = {name: number for number, names in enumerate(FLOORS) for name in names.split()}
 MODULES = sorted(HOUSE.rglob("*.py"))
 PLUGIN_MODULES = sorted(PLUGINS.rglob("*.py"))
-LIBRARIES = {"nlsolve", "numpy", "scipy", "pydantic", "meshio", "rslab"}
+LIBRARIES = {"nlsolve", "numpy", "scipy", "pydantic", "meshio", "rslab", "mpi4py", "petsc4py", "sundials4py"}
 
 
 def imports(path: Path) -> Iterator[tuple[str, list[str]]]:

@@ -446,12 +446,12 @@ def test_cost_optimal_weighs_iterations_against_a_factorisation() -> None:
 
 
 def test_scipys_work_is_in_the_ledger() -> None:
-    """Every value of F is a residual and, but for those at y = 0, a solve."""
+    """Every value of F is a residual and, but for those at y = 0, a solve; another one leads from the last y to u."""
     flow = spin_flow(0.5)
     outcome, ledger = run(flow, ScipyRoot(method="krylov"), Never(), near(flow, 0.52))
     runs = len(outcome.steps) - 1
     assert outcome.status is Status.CONVERGED
-    assert 0 < ledger.counts["residual"] - ledger.counts["triangular_solve"] <= 3 * runs + 2
+    assert runs <= ledger.counts["residual"] + runs - ledger.counts["triangular_solve"] <= 3 * runs
     assert ledger.counts["factorization"] == 1
 
 

@@ -35,25 +35,26 @@ def gmres(product: Map, precondition: Map, b: np.ndarray, tolerance: float, most
     Preconditioned on the right, the residual that is minimised is the true one, and x = Z y needs no further solve.
     """
     size = left = float(np.linalg.norm(b))
-    basis, directions = [b / size], list[np.ndarray]()
+    basis, directions = np.empty((most + 1, len(b))), np.empty((most, len(b)))
+    basis[0] = b / size
     hessenberg = np.zeros((most + 1, most))
     y: np.ndarray = np.zeros(0)
     for k in range(most):
-        directions.append(precondition(basis[k]))
+        directions[k] = precondition(basis[k])
         w: np.ndarray = product(directions[k])
         length = float(np.linalg.norm(w))
         if not np.isfinite(length):
             raise SolveError(Status.NON_FINITE, "a product with the Jacobian was not finite")
         for _ in range(2):  # Gram and Schmidt twice are enough (Kahan)
-            projections = np.array(basis) @ w
-            w = w - projections @ np.array(basis)
+            projections = basis[: k + 1] @ w
+            w = w - projections @ basis[: k + 1]
             hessenberg[: k + 1, k] += projections
         hessenberg[k + 1, k] = np.linalg.norm(w)
         e_1 = np.zeros(k + 2)
         e_1[0] = size
-        y = np.asarray(np.linalg.lstsq(hessenberg[: k + 2, : k + 1], e_1)[0])
+        y = np.asarray(np.linalg.lstsq(hessenberg[: k + 2, : k + 1], e_1, rcond=None)[0])
         left = float(np.linalg.norm(e_1 - hessenberg[: k + 2, : k + 1] @ y))
         if left <= tolerance or hessenberg[k + 1, k] <= np.finfo(float).eps * length:
             break
-        basis.append(w / hessenberg[k + 1, k])
-    return Krylov(np.array(directions).T @ y, left, len(directions))
+        basis[k + 1] = w / hessenberg[k + 1, k]
+    return Krylov(y @ directions[: len(y)], left, len(y))

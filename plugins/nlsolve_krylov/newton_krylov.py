@@ -8,8 +8,7 @@ from typing import ClassVar, Literal
 import numpy as np
 from pydantic import Field
 
-from nlsolve import Globalized, KeptTangent, NonlinearProblem, NonlinearSolver, Step
-from nlsolve_krylov.assembled import AssembledOnce
+from nlsolve import AssembledOnce, Globalized, KeptTangent, NonlinearProblem, NonlinearSolver, Step
 from nlsolve_krylov.forcing import next_forcing
 from nlsolve_krylov.gmres import gmres
 

@@ -7,8 +7,7 @@ from typing import Any, ClassVar, Literal
 
 import numpy as np
 
-from nlsolve import KeptTangent, NonlinearProblem, NonlinearSolver, SolveError, Status, Step
-from nlsolve_krylov.assembled import AssembledOnce
+from nlsolve import AssembledOnce, KeptTangent, NonlinearProblem, NonlinearSolver, SolveError, Status, Step
 
 ACCEPTED = 1e-4  # decrease of ‖R‖ over the predicted one from which a step is taken
 POOR, GOOD = 0.25, 0.75  # the same ratio below which Δ is cut to a quarter of the step, above which it is doubled

@@ -5,11 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from nlsolve import Component, hookimpl
+from nlsolve_peers.kinsol import Kinsol
+from nlsolve_peers.petsc_snes import PetscSnes
 from nlsolve_peers.scipy_root import ScipyRoot
 
-__all__ = ["ScipyRoot"]
+__all__ = ["Kinsol", "PetscSnes", "ScipyRoot"]
 
 
 @hookimpl
 def nlsolve_components() -> Iterable[type[Component]]:
-    return [ScipyRoot]
+    return [ScipyRoot, PetscSnes, Kinsol]

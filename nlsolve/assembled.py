@@ -6,7 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from nlsolve import Expansion, NonlinearProblem
+from nlsolve.problems import Expansion, NonlinearProblem
+from nlsolve.series import Array
 
 
 class AssembledOnce(NonlinearProblem):
@@ -14,15 +15,15 @@ class AssembledOnce(NonlinearProblem):
 
     def __init__(self, problem: NonlinearProblem) -> None:
         self._problem = problem
-        self._last: tuple[np.ndarray, Any] | None = None
+        self._last: tuple[Array, Any] | None = None
 
-    def residual(self, u: np.ndarray) -> np.ndarray:
+    def residual(self, u: Array) -> Array:
         return self._problem.residual(u)
 
-    def jacobian(self, u: np.ndarray) -> Any:
+    def jacobian(self, u: Array) -> Any:
         if self._last is None or not np.array_equal(self._last[0], u):
             self._last = u.copy(), self._problem.jacobian(u)
         return self._last[1]
 
-    def expand(self, u: np.ndarray) -> Expansion:
+    def expand(self, u: Array) -> Expansion:
         return self._problem.expand(u)
