@@ -87,7 +87,7 @@ STEPS: dict[str, str] = {
     "(a new branch is cheaper than more orders)",
     "length": "step length of the line search, or the part of the path a series advanced",
     "contraction": "residual norm over that of the step before, as the refresh rule is told (newton-krylov: per inner "
-    "iteration; scipy-root: per value of R)",
+    "iteration; anm: per order; scipy-root: per value of R)",
     "seconds": "time inside the method so far in the march [s]",
     "probe_x": "place of the probe node, x [mm] (accepted steps)",
     "probe_y": "the same, y [mm]",

@@ -66,6 +66,28 @@ class CostOptimal(RefreshRule):
         return bool(left > self.ratio + left_new)
 
 
+class AverageCost(RefreshRule):
+    """When the next digit of the residual costs more than the digits this tangent has given cost on average:
+
+        1/lg(1/θ) > (ratio + solves)/digits          θ: the contraction of the last step
+
+    in units of one iteration. While K* ages its average cost falls, for its factorisation is shared by more digits, and
+    then rises; it is least where the two sides meet, which is when to replace what wears out (Preinreich 1940). Unlike
+    `cost-optimal` it needs to be told neither how long the march is nor what a new tangent would do.
+    """
+
+    kind: Literal["average-cost"] = "average-cost"
+    ratio: float = Field(40.0, ge=0, description="cost of a new tangent over that of an iteration: factor_solve_ratio")
+
+    def due(self, evidence: Evidence) -> bool:
+        """Cost of the next digit > average cost of the digits so far; always when θ ≥ 1."""
+        if evidence.contraction is None or evidence.contraction == 0.0:
+            return False
+        if not (evidence.contraction < 1.0 and evidence.digits > 0.0):
+            return True
+        return bool(evidence.digits > -np.log10(evidence.contraction) * (self.ratio + evidence.solves))
+
+
 class RangeUnderOne(RefreshRule):
     """When the range of the last series ended before its path did, as in the 2015 paper."""
 
@@ -88,4 +110,4 @@ class Never(RefreshRule):
 
 @hookimpl
 def nlsolve_components() -> Iterable[type[Component]]:
-    return [EveryIteration, EveryM, PoorContraction, CostOptimal, RangeUnderOne, Never]
+    return [EveryIteration, EveryM, PoorContraction, CostOptimal, AverageCost, RangeUnderOne, Never]
