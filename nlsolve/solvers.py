@@ -41,6 +41,7 @@ class Evidence:
     range : a_max of the last series computed with this tangent.
     solves : right-hand sides solved with this tangent.
     digits : decimal digits by which the residual has fallen with it, Σ lg(1/contraction) over its solves.
+    rate : digits by solve, the recent ones: contractions differ between the first and the last steps of an increment.
     """
 
     uses: int = 0
@@ -48,6 +49,7 @@ class Evidence:
     range: float | None = None
     solves: int = 0
     digits: float = 0.0
+    rate: float | None = None
 
 
 class RefreshRule(Component, ABC):

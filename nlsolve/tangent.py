@@ -14,6 +14,7 @@ from nlsolve.solvers import Evidence, KeptTangent, RefreshRule
 from nlsolve.status import SolveError, Status
 
 SMALLEST = 1e-16  # contraction by which digits are counted: beyond it lies rounding
+RECENT = 10.0  # solves whose digits weigh most in their recent rate
 
 
 class Tangent:
@@ -61,8 +62,11 @@ class Tangent:
         """Note what the refresh rule should know about the last step."""
         if contraction is not None:
             solves, self._observed = self.evidence.solves - self._observed, self.evidence.solves
-            gained = -solves * float(np.log10(max(contraction, SMALLEST)))
-            self.evidence = replace(self.evidence, contraction=contraction, digits=self.evidence.digits + gained)
+            rate, before = -float(np.log10(max(contraction, SMALLEST))), self.evidence.rate
+            digits = self.evidence.digits + solves * rate
+            if before is not None:
+                rate = before + (rate - before) * (1.0 - np.exp(-solves / RECENT))
+            self.evidence = replace(self.evidence, contraction=contraction, digits=digits, rate=rate)
         if range is not None:
             self.evidence = replace(self.evidence, range=range)
 

@@ -450,15 +450,15 @@ def test_average_cost_renews_where_the_average_is_least() -> None:
         gains = 1.0 - 0.002 * np.arange(400.0)  # digits of the solves
         average = (cost + np.arange(1.0, 401.0)) / np.cumsum(gains)
         evidence = [
-            Evidence(contraction=10.0**-gain, solves=n, digits=float(digits))
+            Evidence(contraction=10.0**-gain, solves=n, digits=float(digits), rate=gain)
             for n, gain, digits in zip(range(1, 401), gains, np.cumsum(gains), strict=True)
         ]
         dues = [rule.due(each) for each in evidence]
         assert abs(dues.index(True) - int(average.argmin())) <= 1
         assert all(dues[dues.index(True) :])
     assert not rule.due(Evidence())
-    assert rule.due(Evidence(contraction=0.5, solves=3, digits=-1.0))  # it has made things worse
-    assert rule.due(Evidence(contraction=1.0, solves=3, digits=9.0))
+    assert rule.due(Evidence(contraction=0.5, solves=3, digits=-1.0, rate=-1.0))  # it has made things worse
+    assert rule.due(Evidence(contraction=1.0, solves=3, digits=9.0, rate=3.0))
 
 
 def test_digits_and_solves_are_counted_for_each_tangent() -> None:
@@ -470,6 +470,7 @@ def test_digits_and_solves_are_counted_for_each_tangent() -> None:
             tangent.solve(START)
         tangent.observe(contraction=contraction)
     assert (tangent.evidence.solves, tangent.evidence.digits) == (4, pytest.approx(5.0))
+    assert tangent.evidence.rate == pytest.approx(1.0 + (1.0 - np.exp(-0.1)))
     tangent.refresh_if_due(view, START)
     assert tangent.evidence.solves == 4
     tangent.refresh_if_due(view, START)

@@ -67,9 +67,9 @@ class CostOptimal(RefreshRule):
 
 
 class AverageCost(RefreshRule):
-    """When the next digit of the residual costs more than the digits this tangent has given cost on average:
+    """When a digit of the residual costs more now than the digits this tangent has given cost on average:
 
-        1/lg(1/θ) > (ratio + solves)/digits          θ: the contraction of the last step
+        1/rate > (ratio + solves)/digits          rate: digits by solve, recently
 
     in units of one iteration. While K* ages its average cost falls, for its factorisation is shared by more digits, and
     then rises; it is least where the two sides meet, which is when to replace what wears out (Preinreich 1940). Unlike
@@ -80,12 +80,12 @@ class AverageCost(RefreshRule):
     ratio: float = Field(40.0, ge=0, description="cost of a new tangent over that of an iteration: factor_solve_ratio")
 
     def due(self, evidence: Evidence) -> bool:
-        """Cost of the next digit > average cost of the digits so far; always when θ ≥ 1."""
-        if evidence.contraction is None or evidence.contraction == 0.0:
+        """Cost of a digit now > average cost of the digits so far; always when the last step gained nothing."""
+        if evidence.contraction is None or evidence.rate is None:
             return False
-        if not (evidence.contraction < 1.0 and evidence.digits > 0.0):
+        if not evidence.contraction < 1.0:
             return True
-        return bool(evidence.digits > -np.log10(evidence.contraction) * (self.ratio + evidence.solves))
+        return not evidence.digits <= evidence.rate * (self.ratio + evidence.solves)
 
 
 class RangeUnderOne(RefreshRule):
