@@ -111,7 +111,7 @@ STEPS: dict[str, str] = {
     "(a new branch is cheaper than more orders)",
     "length": "step length of the line search, or the part of the path a series advanced",
     "contraction": "residual norm over that of the step before, as the refresh rule is told (newton-krylov: per inner "
-    "iteration; petsc-snes, kinsol: per solve with K*; scipy-root: per value of R)",
+    "iteration; anm: per order; petsc-snes, kinsol: per solve with K*; scipy-root: per value of R)",
     **REPORTED,
     "seconds": "time inside the method so far in the march [s]",
     "probe_x": "place of the probe node, x [mm] (accepted steps)",

@@ -14,6 +14,9 @@ from nlsolve.series import Array
 from nlsolve.solvers import Evidence, KeptTangent, RefreshRule
 from nlsolve.status import SolveError, Status
 
+SMALLEST = 1e-16  # contraction by which digits are counted: beyond it lies rounding
+RECENT = 10.0  # solves whose digits weigh most in their recent rate
+
 
 class Tangent:
     """The kept tangent of one march: its factors, what has been observed of it, and its refresh rule.
@@ -30,6 +33,7 @@ class Tangent:
         self.factors: Factors | None = None
         self.evidence = Evidence()
         self.branches = 0
+        self._observed = 0  # solves that `digits` accounts for
         self.view: KeptTangent = _view(self)
 
     def refresh_if_due(self, problem: NonlinearProblem, state: Array) -> bool:
@@ -38,7 +42,7 @@ class Tangent:
         if due:
             self._matrix = problem.jacobian(state)
             self.factors = factorize_counted(self._linear, self._matrix, self.factors or self._pattern, self._ledger)
-            self.evidence = Evidence()
+            self.evidence, self._observed = Evidence(), 0
             self.branches += 1
         self.evidence = replace(self.evidence, uses=self.evidence.uses + 1)
         return due
@@ -50,6 +54,7 @@ class Tangent:
         if not np.isfinite(rhs).all():
             raise SolveError(Status.NON_FINITE, "a right-hand side for the tangent was not finite")
         x = solve_counted(self.factors, self._matrix, rhs, self._linear.refinement, self._ledger)
+        self.evidence = replace(self.evidence, solves=self.evidence.solves + 1)
         if not np.isfinite(x).all():
             raise SolveError(Status.SINGULAR_TANGENT, "a solve with the tangent gave no finite answer")
         return x
@@ -57,7 +62,12 @@ class Tangent:
     def observe(self, *, contraction: float | None = None, range: float | None = None) -> None:
         """Note what the refresh rule should know about the last step."""
         if contraction is not None:
-            self.evidence = replace(self.evidence, contraction=contraction)
+            solves, self._observed = self.evidence.solves - self._observed, self.evidence.solves
+            rate, before = -float(np.log10(max(contraction, SMALLEST))), self.evidence.rate
+            digits = self.evidence.digits + solves * rate
+            if before is not None:
+                rate = before + (rate - before) * (1.0 - np.exp(-solves / RECENT))
+            self.evidence = replace(self.evidence, contraction=contraction, digits=digits, rate=rate)
         if range is not None:
             self.evidence = replace(self.evidence, range=range)
 

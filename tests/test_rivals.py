@@ -20,7 +20,7 @@ from nlsolve_krylov.trust_region import cauchy_point, dogleg
 from nlsolve_laws import PowerLaw
 from nlsolve_newton import LevenbergMarquardt, ModifiedNewton, Newton, PseudoTransient
 from nlsolve_peers import ScipyRoot
-from nlsolve_refresh import CostOptimal, EveryIteration, Never, PoorContraction
+from nlsolve_refresh import AverageCost, CostOptimal, EveryIteration, EveryM, Never, PoorContraction
 from nlsolve_scenes import StirringTool
 from nlsolve_scenes.rings import Rings
 from pydantic import ValidationError
@@ -440,6 +440,46 @@ def test_cost_optimal_weighs_iterations_against_a_factorisation() -> None:
     dues = [rule.due(Evidence(contraction=c)) for c in (None, 0.0, 0.3, 0.33, 1.0, float("nan"))]
     assert dues == [False, False, False, True, True, True]
     assert not rule.with_(ratio=1000.0).due(Evidence(contraction=0.9))
+
+
+def test_average_cost_renews_where_the_average_is_least() -> None:
+    """c + n solves for Σ lg(1/θ_i) digits with θ growing as K* ages: due where the cost of a digit begins to rise."""
+    for cost in (5.0, 40.0):
+        rule = AverageCost(ratio=cost)
+        check_refresh_rule(rule)
+        gains = 1.0 - 0.002 * np.arange(400.0)  # digits of the solves
+        average = (cost + np.arange(1.0, 401.0)) / np.cumsum(gains)
+        evidence = [
+            Evidence(contraction=10.0**-gain, solves=n, digits=float(digits), rate=gain)
+            for n, gain, digits in zip(range(1, 401), gains, np.cumsum(gains), strict=True)
+        ]
+        dues = [rule.due(each) for each in evidence]
+        assert abs(dues.index(True) - int(average.argmin())) <= 1
+        assert all(dues[dues.index(True) :])
+    assert not rule.due(Evidence())
+    assert rule.due(Evidence(contraction=0.5, solves=3, digits=-1.0, rate=-1.0))  # it has made things worse
+    assert rule.due(Evidence(contraction=1.0, solves=3, digits=9.0, rate=3.0))
+
+
+def test_digits_and_solves_are_counted_for_each_tangent() -> None:
+    """Three solves of contraction 0.1 a solve, then one of 0.01: five digits; and a new tangent begins at none."""
+    tangent, view = Tangent(DenseLU(), EveryM(m=2), Ledger()), Audited(SmallProblem(), Ledger()).view
+    tangent.refresh_if_due(view, START)
+    for solves, contraction in ((3, 0.1), (1, 0.01)):
+        for _ in range(solves):
+            tangent.solve(START)
+        tangent.observe(contraction=contraction)
+    assert (tangent.evidence.solves, tangent.evidence.digits) == (4, pytest.approx(5.0))
+    assert tangent.evidence.rate == pytest.approx(1.0 + (1.0 - np.exp(-0.1)))
+    tangent.refresh_if_due(view, START)
+    assert tangent.evidence.solves == 4
+    tangent.refresh_if_due(view, START)
+    assert (tangent.evidence.solves, tangent.evidence.digits) == (0, 0.0)
+
+
+@pytest.mark.parametrize("solver", [ModifiedNewton(), Broyden(), Anderson(), NewtonKrylov()], ids=name)
+def test_every_kept_tangent_conforms_under_average_cost(solver: NonlinearSolver) -> None:
+    check_solver(solver, AverageCost(ratio=2.0))
 
 
 # SciPy.

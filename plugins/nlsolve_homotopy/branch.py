@@ -30,6 +30,12 @@ class Branch:
         """‖G(0)‖."""
         return float(np.linalg.norm(self.rhs[0]))
 
+    @property
+    def contraction(self) -> float:
+        """(‖r_p‖/‖r_1‖)^(1/(p−1)): what an order leaves of the residual, in the mean; r_{j+1} is left by W_1 … W_j."""
+        first = self.residual
+        return float((np.linalg.norm(self.rhs[-1]) / first) ** (1.0 / (self.order - 1))) if first else 0.0
+
     def append(self, rhs: np.ndarray, w_j: np.ndarray) -> None:
         """Push W_j and r_j = K* W_j."""
         self.rhs.append(rhs)

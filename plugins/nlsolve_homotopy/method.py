@@ -73,7 +73,7 @@ class AsymptoticNumericalMethod(NonlinearSolver):
 
     def steps(self, problem: NonlinearProblem, tangent: KeptTangent, start: np.ndarray) -> Iterator[Step]:
         """The ends of the branches, and of their corrections."""
-        state, size = start, 0.0
+        state = start
         goal = None if self.residual is None else self.residual * problem.scale(start)
         yield Step(state)
         while True:
@@ -84,11 +84,8 @@ class AsymptoticNumericalMethod(NonlinearSolver):
             length = min(1.0, reach)
             if not length > SHORTEST_RANGE:
                 raise SolveError(Status.RANGE_EXHAUSTED, f"a_max = {reach:.1e} for a series of order {branch.order}")
-            notes: dict[str, float | str] = {"range": reach, "length": length, "limited_by": limit}
-            if size:
-                notes["contraction"] = branch.residual / size
-                tangent.observe(contraction=branch.residual / size)
-            size = branch.residual
+            notes: dict[str, float | str]
+            notes = {"range": reach, "length": length, "limited_by": limit, "contraction": branch.contraction}
             state = state + branch.increment(length)
             yield Step(state, claim=length == 1.0, notes=notes)
             for _ in range(self.corrections if length == 1.0 else 0):
@@ -98,7 +95,9 @@ class AsymptoticNumericalMethod(NonlinearSolver):
     def _branch(
         self, problem: NonlinearProblem, tangent: KeptTangent, state: np.ndarray, goal: float | None
     ) -> tuple[Branch, float, str]:
-        """W_1 … W_p around `state`, a_max, which the refresh rule is told, and what limited it."""
+        """W_1 … W_p around `state`, a_max, and what limited it. The refresh rule is told a_max, and the contraction by
+        order, which is what K* can be held responsible for.
+        """
         branch, rule = Branch(problem, state, self.form, self.extrapolation), RULES[self.range]
         reaches: list[float] = []
         limit: str = self.range
@@ -124,7 +123,7 @@ class AsymptoticNumericalMethod(NonlinearSolver):
                 )
             reaches.append(rule(branch, self._tolerance(branch, goal), True))
         reach = 0.0 if np.isnan(reaches[-1]) else reaches[-1]
-        tangent.observe(range=reach)
+        tangent.observe(range=reach, contraction=branch.contraction)
         if reach >= 1.0:
             return branch, reach, END
         if self.adaptive and branch.order == self.order:
@@ -133,7 +132,9 @@ class AsymptoticNumericalMethod(NonlinearSolver):
 
     def _tolerance(self, branch: Branch, goal: float | None) -> float:
         """η: as given, or the part of ‖G(0)‖ that a wanted residual leaves."""
-        return self.tolerance if goal is None else min(goal / branch.residual, LOOSEST)
+        if goal is None:
+            return self.tolerance
+        return goal / branch.residual if goal < LOOSEST * branch.residual else LOOSEST
 
     def _is_dear(self, reaches: list[float], p: int) -> bool:
         """Whether the order p added less range than a new branch of p orders would, at the price of an order."""

@@ -66,6 +66,28 @@ class CostOptimal(RefreshRule):
         return bool(left > self.ratio + left_new)
 
 
+class AverageCost(RefreshRule):
+    """When a digit of the residual costs more now than the digits this tangent has given cost on average:
+
+        1/rate > (ratio + solves)/digits          rate: digits by solve, recently
+
+    in units of one iteration. While K* ages its average cost falls, for its factorisation is shared by more digits, and
+    then rises; it is least where the two sides meet, which is when to replace what wears out (Preinreich 1940). Unlike
+    `cost-optimal` it needs to be told neither how long the march is nor what a new tangent would do.
+    """
+
+    kind: Literal["average-cost"] = "average-cost"
+    ratio: float = Field(40.0, ge=0, description="cost of a new tangent over that of an iteration: factor_solve_ratio")
+
+    def due(self, evidence: Evidence) -> bool:
+        """Cost of a digit now > average cost of the digits so far; always when the last step gained nothing."""
+        if evidence.contraction is None or evidence.rate is None:
+            return False
+        if not evidence.contraction < 1.0:
+            return True
+        return not evidence.digits <= evidence.rate * (self.ratio + evidence.solves)
+
+
 class RangeUnderOne(RefreshRule):
     """When the range of the last series ended before its path did, as in the 2015 paper."""
 
@@ -88,4 +110,4 @@ class Never(RefreshRule):
 
 @hookimpl
 def nlsolve_components() -> Iterable[type[Component]]:
-    return [EveryIteration, EveryM, PoorContraction, CostOptimal, RangeUnderOne, Never]
+    return [EveryIteration, EveryM, PoorContraction, CostOptimal, AverageCost, RangeUnderOne, Never]
