@@ -10,7 +10,7 @@ from typing import Any, Literal
 import numpy as np
 import pytest
 import scipy.sparse as sp
-from nlsolve_newton import Newton, Robust
+from nlsolve_newton import Newton, PseudoTransient, Robust
 from nlsolve_refresh import EveryIteration
 from nlsolve_superlu import SuperLU
 from nlsolve_systems import Bratu, PLaplacian, Published
@@ -86,6 +86,15 @@ class Elsewhere(FarOut):
 
     def roots(self) -> np.ndarray:
         return np.zeros((1, 1))
+
+
+class Flat(FarOut):
+    """x² + 1 from its least point: nothing can be factorised there."""
+
+    kind: Literal["flat"] = "flat"  # type: ignore[assignment]
+
+    def formula(self, u: Any) -> Any:
+        return u * u + 1.0
 
 
 def solve(system: System, solver: NonlinearSolver | None = None, **parts: Any) -> Any:
@@ -302,6 +311,13 @@ def test_every_strategy_meets_the_same_root(scene: dict[str, Any]) -> None:
     assert refused.status == "not applicable"
 
 
+def test_pseudo_transient_damps_equations_of_either_sign() -> None:
+    """1 − x has the slope −1: with σ |J_ii| on it the first matrix would be singular."""
+    run = solve(Published(problem="generalized-rosenbrock"), PseudoTransient()).summary
+    assert run["status"] == "converged"
+    assert run["root_error"] < 1e-9
+
+
 # Several methods in one.
 
 
@@ -320,7 +336,7 @@ def test_a_leap_leaves_the_least_point_of_the_residual() -> None:
 
 
 def test_the_last_method_tells_how_it_ended() -> None:
-    run = solve(Published(problem="powell-badly-scaled", factor=100.0), Robust()).summary
+    run = solve(Flat(), Robust()).summary
     assert run["status"] == "singular tangent"
 
 
