@@ -424,8 +424,9 @@ def test_plans_and_diagnoses_of_systems(registry: Registry) -> None:
     assert plan["unknowns"].tolist() == [2, 2]
     assert plan["increments"].tolist() == [1, 1]
     assert (plan["seconds"] > 0.0).all()
-    (row,) = diagnose(study).drop(columns="scene.radius").drop_duplicates().itertuples(index=False)
-    assert row.operator == "a system of equations has no cloud, and no operators on it"
+    twice = STUDY | {"sweep": [*STUDY["sweep"], {"grid": {"stop.tolerance": [1e-6, 1e-9]}}]}
+    rows = diagnose(Study.from_dict(twice, registry=registry))
+    assert rows["operator"].tolist() == ["a system of equations has no cloud, and no operators on it"] * 2
     flat = {"kind": "bratu", "nodes": 2, "strength": 9.0}  # the least eigenvalue of −Δ, so that J is singular at rest
     singular = {"question": "?", "scene": flat, "solver": {"kind": "newton"}}
     (costs,) = forecast(Study.from_dict(singular)).to_dict("records")
