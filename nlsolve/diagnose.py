@@ -12,7 +12,6 @@ from nlsolve.march import Setup
 from nlsolve.status import SolveError
 from nlsolve.studies import Study
 
-
 NO_CLOUD = "a system of equations has no cloud, and no operators on it"
 
 
