@@ -13,6 +13,8 @@ from nlsolve.outcomes import names_settings
 from nlsolve.status import SolveError
 from nlsolve.studies import Study
 
+NO_CLOUD = "a system of equations has no cloud, and no operators on it"
+
 
 def telling(name: str) -> bool:
     """Is this a parameter of clouds or discretizers, or the name of a setting?"""
@@ -30,8 +32,9 @@ def diagnose(study: Study) -> pd.DataFrame:
         setup = case.setup
         named = {name: case.parameters[name] for name in case.swept if telling(name)}
         if not isinstance(setup, Setup):
-            without = {**named, "operator": "a system of equations has no cloud, and no operators on it"}
-            rows += [without] if without not in rows else []
+            key = setup.scene.model_dump_json()
+            rows += [{**named, "operator": NO_CLOUD}] if key not in seen else []
+            seen.add(key)
             continue
         try:
             cloud = setup.scene.cloud(setup.law)

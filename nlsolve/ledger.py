@@ -82,9 +82,9 @@ class SealedMatrix:
         return _contents[self](vector, transposed=True)
 
     def damped(self, shift: float) -> SealedMatrix:
-        """A + shift · diag(|A_ii|), sealed like A."""
+        """A + shift · diag(A_ii), sealed like A: each A_ii grows in its own direction, and cannot be cancelled."""
         contents = _contents[self]
-        heavier = sp.diags_array(shift * np.abs(contents.matrix.diagonal()))
+        heavier = sp.diags_array(shift * contents.matrix.diagonal())
         return _seal(contents.matrix + heavier, contents.ledger)
 
     def augmented(self, shift: float) -> SealedMatrix:

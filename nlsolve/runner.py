@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 import traceback
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -38,6 +39,9 @@ class Event:
     run: Mapping[str, Any] | None = None
     resumed: bool = False
 
+
+SECONDS_BETWEEN_FRAMES = 10.0
+"""The parts of finished cases are kept one by one; together they are written now and then, and at the end."""
 
 Listener = Callable[[Event], None]
 
@@ -93,20 +97,26 @@ def run(
     store = None if out is None else Store(Path(out), study)
     tell = listen or (lambda event: None)
     parts = _finished(study, store)
-    for number, case in enumerate(study.cases, 1):
-        begun = Event(case, number, len(study.cases))
-        resumed = case.id in parts
-        if not resumed:
-            tell(begun)
-            parts[case.id] = execute(case, number, len(study.cases), tell)
-            if store is not None:
-                store.save(parts[case.id])
-                store.write_frames(_merged(study, parts))
-        tell(Event(case, number, len(study.cases), run=parts[case.id].run, resumed=resumed))
+    written = time.monotonic()
+    try:
+        for number, case in enumerate(study.cases, 1):
+            begun = Event(case, number, len(study.cases))
+            resumed = case.id in parts
+            if not resumed:
+                tell(begun)
+                parts[case.id] = execute(case, number, len(study.cases), tell)
+                if store is not None:
+                    store.save(parts[case.id])
+                    if time.monotonic() - written > SECONDS_BETWEEN_FRAMES:
+                        store.write_frames(_merged(study, parts))
+                        written = time.monotonic()
+            tell(Event(case, number, len(study.cases), run=parts[case.id].run, resumed=resumed))
+    finally:
+        if store is not None:
+            store.write_frames(_merged(study, parts))
     frames = _merged(study, parts)
     if store is None:
         return Results(study, frames.runs, frames.steps, frames.fields)
-    store.write_frames(frames)
     return Results(study, frames.runs, frames.steps, frames.fields, store.folder, _show(store, study, frames))
 
 

@@ -85,15 +85,24 @@ def test_the_mean_of_a_root_of_the_h_function(system: System) -> None:
     """Summed over i, the equations of any nodes give c m²/4 − m + 1 = 0 for the mean m."""
     c = getattr(system, "albedo", 0.9)
     roots = system.roots()
-    if roots is None:
-        u = system.start()
-        for _ in range(10):
-            u = u - np.linalg.solve(Algebraic(system).jacobian(u).toarray(), system.formula(u))
-        roots = u[None]
+    assert roots is not None
     for root in roots:
         mean = root.mean()
         assert c * mean**2 / 4.0 - mean + 1.0 == pytest.approx(0.0, abs=1e-12)
     assert roots[0].mean() == pytest.approx(2.0 * (1.0 - np.sqrt(1.0 - c)) / c, rel=1e-13)
+
+
+def test_at_the_fold_of_the_h_function_no_root_is_listed_and_it_is_said_to_be_singular() -> None:
+    system = Chandrasekhar(size=10, albedo=1.0)
+    assert system.roots() is None
+    assert system.singular
+    problem = Algebraic(system)
+    u = system.start()
+    for _ in range(40):
+        u = u - np.linalg.lstsq(problem.jacobian(u).toarray(), problem.residual(u), rcond=None)[0]
+    assert u.mean() == pytest.approx(2.0, abs=1e-5)  # 2 (1 ± 0)/1
+    values = np.linalg.svd(problem.jacobian(u).toarray(), compute_uv=False)
+    assert values[-1] < 1e-5 * values[0]
 
 
 def test_two_forms_of_one_equation_have_one_root() -> None:

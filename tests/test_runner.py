@@ -128,6 +128,18 @@ def test_an_interruption_leaves_what_is_finished(study, tmp_path, monkeypatch, m
     assert len(marched) == 2, "the two finished cases were not run again"
 
 
+def test_the_frames_are_not_written_anew_for_every_case(study, tmp_path, monkeypatch):
+    """Parts are kept one by one; a thousand short cases would spend their time on writing what is written again."""
+    written = []
+    write = nlsolve.runner.Store.write_frames
+    monkeypatch.setattr("nlsolve.runner.Store.write_frames", lambda store, frames: written.append(write(store, frames)))
+    run(study, tmp_path / "out")
+    assert len(written) == 1
+    monkeypatch.setattr("nlsolve.runner.SECONDS_BETWEEN_FRAMES", -1.0)
+    run(study, tmp_path / "other")
+    assert len(written) == 1 + len(study.cases) + 1
+
+
 def test_events(study, tmp_path):
     events: list[Event] = []
     run(study, tmp_path / "out", listen=events.append)

@@ -12,10 +12,10 @@ from nlsolve import Expansion, KeptTangent, NonlinearProblem, NonlinearSolver, S
 
 
 class PseudoTransient(NonlinearSolver):
-    """Implicit Euler steps of D du/dt = −R(u), one Newton iteration each, with D = diag(|J_ii|): a time step of 1/σ in
-    units of each unknown's own time. It grows as the residual falls (switched evolution relaxation: Mulder & van Leer
-    1985; Kelley & Keyes 1998): far away the path to rest is followed, near it Newton's steps are taken, and no length
-    is searched for.
+    """Implicit Euler steps of D du/dt = −R(u), one Newton iteration each, with D = diag(J_ii): a time step of 1/σ in
+    units of each unknown's own time, which runs backwards where J_ii < 0. It grows as the residual falls (switched
+    evolution relaxation: Mulder & van Leer 1985; Kelley & Keyes 1998): far away the path to rest is followed, near it
+    Newton's steps are taken, and no length is searched for.
     """
 
     kind: Literal["pseudo-transient"] = "pseudo-transient"

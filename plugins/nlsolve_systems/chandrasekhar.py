@@ -10,6 +10,9 @@ from pydantic import Field
 from nlsolve import System
 from nlsolve_systems.burkardt import chandrasekhar_at
 
+SLOWEST = 0.97  # contraction of the iteration that finds the root
+ROUNDING = 1e-18
+
 
 class Chandrasekhar(System):
     """By the midpoint rule (Kelley 1980; Kelley 1995, 5.6); at c = 1 the Jacobian at the root is singular. The mean of
@@ -22,11 +25,26 @@ class Chandrasekhar(System):
 
     def formula(self, u: Any) -> Any:
         """H_i − 1/(1 − c/(2 n) Σ_j μ_i H_j/(μ_i + μ_j)),  μ_i = (i − 1/2)/n."""
-        return chandrasekhar_at(u, (np.arange(self.size) + 0.5) / self.size, self.albedo)
+        return chandrasekhar_at(u, self._midpoints(), self.albedo)
+
+    def _midpoints(self) -> np.ndarray:
+        return (np.arange(self.size) + 0.5) / self.size
 
     def standard_start(self) -> np.ndarray:
         """One everywhere."""
         return np.ones(self.size)
+
+    def roots(self) -> np.ndarray | None:
+        """The smaller one, to which H ← 1/(1 − …) rises from one, an error by 1 − √(1 − c) each time; none near c = 1,
+        where that takes too long.
+        """
+        rate = 1.0 - np.sqrt(1.0 - self.albedo)
+        if rate > SLOWEST:
+            return None
+        root = np.ones(self.size, dtype=np.longdouble)
+        for _ in range(int(np.ceil(np.log(ROUNDING) / np.log(rate)))):
+            root = root - chandrasekhar_at(root, self._midpoints(), self.albedo)
+        return root.astype(float)[None]
 
     @property
     def singular(self) -> bool:
