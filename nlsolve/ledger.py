@@ -27,24 +27,38 @@ KINDS = ("residual", "jacobian", "matrix_product", "factorization", "triangular_
 
 @dataclass
 class Ledger:
-    """Counts and seconds by kind of work; the kind "method" holds the time spent inside a method, all included."""
+    """Counts and seconds by kind of work; the kind "method" holds the time spent inside a method, all included.
 
+    clock : seconds since some moment; those that passed, or those the processor worked for this process.
+    """
+
+    clock: Callable[[], float] = time.perf_counter
     counts: Counter[str] = field(default_factory=Counter)
     seconds: Counter[str] = field(default_factory=Counter)
 
     @contextmanager
     def entry(self, kind: str) -> Iterator[None]:
         """Count one piece of work of this kind and the time it takes, even if it fails."""
-        begun = time.perf_counter()
+        begun = self.clock()
         try:
             yield
         finally:
-            self.seconds[kind] += time.perf_counter() - begun  # type: ignore[assignment]
+            self.seconds[kind] += self.clock() - begun  # type: ignore[assignment]
             self.counts[kind] += 1
 
     def each(self, kind: str) -> float:
         """Mean seconds of one piece of work of this kind; NaN when there was none."""
         return self.seconds[kind] / self.counts[kind] if self.counts[kind] else float("nan")
+
+    def details(self) -> dict[str, float]:
+        """What a cost model wants to know besides the counts and seconds by kind, by the names of `nlsolve.columns`."""
+        asked_for = sum(self.seconds[kind] for kind in KINDS)
+        return {
+            "expansions": self.counts["expansion"],
+            "series_terms": self.counts["series_term"],
+            "matrix_products": self.counts["matrix_product"],
+            "seconds_own": self.seconds["method"] - asked_for,
+        }
 
 
 class SealedMatrix:
@@ -138,6 +152,7 @@ def _view(problem: NonlinearProblem, ledger: Ledger, remember: Any) -> Nonlinear
                 while known <= j:  # orders that are skipped over are work too; an order asked for again is not
                     with ledger.entry("series_order"):
                         expansion.coefficient(known)
+                    ledger.counts["series_term"] += known  # order j convolves j earlier terms
                     known += 1
                 return expansion.coefficient(j)
 
@@ -177,6 +192,7 @@ def _view(problem: NonlinearProblem, ledger: Ledger, remember: Any) -> Nonlinear
             with ledger.entry("residual"):
                 expansion = problem.expand(u)
                 expansion.coefficient(0)
+            ledger.counts["expansion"] += 1
             return CountedExpansion(expansion)
 
         def scale(self, u: Array) -> float:

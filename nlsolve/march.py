@@ -77,24 +77,51 @@ class Progress:
 
 @dataclass(frozen=True)
 class Record:
-    """What one case leaves: its row of `runs`, its rows of `steps`, its `fields` (a row a node and recorded time)."""
+    """What one case leaves: its row of `runs`, its rows of `steps`, its `fields` (a row a node and recorded time).
+
+    problem, state : the last that was solved, None before the first; for measuring what work on them costs.
+    """
 
     summary: dict[str, Any]
     steps: pd.DataFrame
     fields: pd.DataFrame = field(default_factory=pd.DataFrame)
+    problem: Flow | None = None
+    state: Array | None = None
 
 
-def march(setup: Setup, listen: Callable[[Progress], None] | None = None) -> Record:
-    """Run one case; every ending, failure included, is in the record."""
-    return _March(setup, listen or (lambda progress: None)).run()
+def march(
+    setup: Setup,
+    listen: Callable[[Progress], None] | None = None,
+    clock: Callable[[], float] = time.perf_counter,
+) -> Record:
+    """Run one case; every ending, failure included, is in the record. `clock` is what its seconds are told by."""
+    return _March(setup, listen or (lambda progress: None), clock).run()
+
+
+def sample(setup: Setup) -> tuple[Flow, Array, Ledger]:
+    """The balance of a case at t = 0, a state for it, and the books of its operators; nothing is iterated.
+
+    The state is one Newton step away from rest under the easiest law of the way to the first state: where that law is
+    Newtonian, the flow of a Newtonian material. Raises SolveError.
+    """
+    case = _March(setup, lambda progress: None)
+    case.begin()
+    easiest = case.flow_of(setup.law.continuation(setup.start.by, setup.start.values)[0])
+    rest = easiest.unknowns(case.velocity)
+    factors = setup.linear.factorize(easiest.jacobian(rest))
+    state = rest - factors.solve(easiest.residual(rest))
+    case.keep(easiest, state)
+    return case.flow_of(setup.law), state, case.ledger
 
 
 class _March:
     """The state of one case on its way: cloud, operators, velocity, and the books of the start and of the march."""
 
-    def __init__(self, setup: Setup, listen: Callable[[Progress], None]) -> None:
-        self.setup, self.scene, self.listen = setup, setup.scene, listen
-        self.start_ledger, self.ledger = Ledger(), Ledger()
+    def __init__(
+        self, setup: Setup, listen: Callable[[Progress], None], clock: Callable[[], float] = time.perf_counter
+    ) -> None:
+        self.setup, self.scene, self.listen, self.clock = setup, setup.scene, listen, clock
+        self.start_ledger, self.ledger = Ledger(clock), Ledger(clock)
         self.start_tangent = Tangent(setup.linear, None, self.start_ledger)
         self.tangent = Tangent(setup.linear, setup.refresh, self.ledger)
         self.seconds_start = 0.0
@@ -152,7 +179,7 @@ class _March:
     def first_state(self) -> Outcome:
         """Quasi-static state at t = 0 by continuation of the law; a steady scene's last stage is the case's own."""
         *easier, target = self.setup.law.continuation(self.setup.start.by, self.setup.start.values)
-        begun = time.perf_counter()
+        begun = self.clock()
         outcome, law = None, target
         for law in easier:
             outcome = self.start_stage(law)
@@ -161,7 +188,7 @@ class _March:
         if self.scene.increments and (outcome is None or outcome.status is Status.CONVERGED):
             law = target
             outcome = self.iterate_pressure(lambda: self.start_stage(target))
-        self.seconds_start = time.perf_counter() - begun
+        self.seconds_start = self.clock() - begun
         self.tangent = Tangent(self.setup.linear, self.setup.refresh, self.ledger, self.start_tangent.factors)
         if outcome is not None and outcome.status is not Status.CONVERGED:
             by = self.setup.start.by
@@ -356,6 +383,7 @@ class _March:
             "seconds_operators": ledger.seconds["operators"],
             "seconds_start": self.seconds_start,
             "seconds_all": ledger.seconds["method"] + ledger.seconds["operators"] + self.seconds_start,
+            **ledger.details(),
             "ordering": factors.ordering if factors else None,
             "fill": factors.fill if factors else None,
             "factor_solve_ratio": ledger.each("factorization") / ledger.each("triangular_solve"),
@@ -371,4 +399,4 @@ class _March:
             summary |= audit(self.scene, discretizer, flow, velocity, change, reached)
         steps = pd.DataFrame(self.rows, columns=[name for name in STEPS if name != "case"])
         fields = pd.concat(self.snapshots, ignore_index=True) if self.snapshots else pd.DataFrame()
-        return Record(summary, steps, fields)
+        return Record(summary, steps, fields, self.flow, None if self.flow is None else self.unknowns)

@@ -4,18 +4,22 @@ from __future__ import annotations
 
 import traceback
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import pandas as pd
 from threadpoolctl import threadpool_limits
 
+from nlsolve.costs import CLOCKS, Timing, measure
 from nlsolve.errors import StudyError, did_you_mean
 from nlsolve.figures import FigureError, Frames, draw, save
-from nlsolve.march import Progress, march
+from nlsolve.linear import LinearSolver
+from nlsolve.march import Progress, Record, march
+from nlsolve.outcomes import number
+from nlsolve.predictions import UNITS, with_predictions
 from nlsolve.report import write_report
-from nlsolve.status import Status
+from nlsolve.status import SolveError, Status
 from nlsolve.store import Part, Store, merge
 from nlsolve.studies import Case, Study
 from nlsolve.tables import Table, build
@@ -90,16 +94,18 @@ def run(
     store = None if out is None else Store(Path(out), study)
     tell = listen or (lambda event: None)
     parts = _finished(study, store)
-    for number, case in enumerate(study.cases, 1):
-        begun = Event(case, number, len(study.cases))
-        resumed = case.id in parts
+    turns = [(turn, case) for turn in range(1, study.timing.rounds + 1) for case in study.cases]
+    for position, (turn, case) in enumerate(turns, 1):
+        begun = Event(case, position, len(turns))
+        resumed = case.id in parts and _rounds(parts[case.id], study.timing) >= turn
         if not resumed:
             tell(begun)
-            parts[case.id] = execute(case, number, len(study.cases), tell)
+            again = execute(case, position, len(turns), tell, study.timing)
+            parts[case.id] = _fastest(parts.get(case.id), again, study.timing)
             if store is not None:
                 store.save(parts[case.id])
                 store.write_frames(_merged(study, parts))
-        tell(Event(case, number, len(study.cases), run=parts[case.id].run, resumed=resumed))
+        tell(Event(case, position, len(turns), run=parts[case.id].run, resumed=resumed))
     frames = _merged(study, parts)
     if store is None:
         return Results(study, frames.runs, frames.steps, frames.fields)
@@ -107,20 +113,50 @@ def run(
     return Results(study, frames.runs, frames.steps, frames.fields, store.folder, _show(store, study, frames))
 
 
-def execute(case: Case, number: int, cases: int, tell: Listener) -> Part:
+def execute(case: Case, number: int, cases: int, tell: Listener, timing: Timing) -> Part:
     """March one case. Whatever it raises, an interruption excepted, becomes a row that says what and where."""
     try:
         with threadpool_limits(limits=1):
-            record = march(case.setup, lambda progress: tell(Event(case, number, cases, progress=progress)))
+            clock = CLOCKS[timing.clock]
+            record = march(case.setup, lambda progress: tell(Event(case, number, cases, progress=progress)), clock)
+            units = unit_costs(record, case.setup.linear, clock) if timing.calibrate else {}
     except Exception as error:  # the one boundary at which a crash turns into a result
         place = traceback.extract_tb(error.__traceback__)[-1]
         message = f"{type(error).__name__}: {error} ({place.filename}:{place.lineno})"
         summary: dict[str, Any] = {"status": Status.CRASHED.word, "message": message}
         steps = fields = pd.DataFrame()
     else:
-        summary, steps, fields = record.summary, record.steps, record.fields
+        timed = {"rounds": 1, "seconds_most": record.summary.get("seconds"), "clock": timing.clock}
+        summary, steps, fields = {**record.summary, **timed, **units}, record.steps, record.fields
     row = {"case": case.id, **summary, **case.parameters}
     return Part(row, _of_case(case.id, steps), _of_case(case.id, fields))
+
+
+def unit_costs(record: Record, linear: LinearSolver, clock: Callable[[], float]) -> dict[str, float]:
+    """What work on the last problem of a march costs, as columns of `runs`; NaN where there is none to be measured."""
+    nothing = dict.fromkeys(UNITS, float("nan"))
+    if record.problem is None or record.state is None:
+        return nothing
+    try:
+        return measure(record.problem, linear, record.state, clock=clock).columns()
+    except SolveError:  # the tangent at the end of the march, which its status tells of, cannot be factorised
+        return nothing
+
+
+def _rounds(part: Part, timing: Timing) -> int:
+    """How often a case has been timed in the way the study asks for; 0 as well for one that crashed."""
+    known, units = number(part.run.get("rounds")), UNITS[0] in part.run or not timing.calibrate
+    return int(known) if known > 0 and units and part.run.get("clock") == timing.clock else 0
+
+
+def _fastest(before: Part | None, again: Part, timing: Timing) -> Part:
+    """Of the rounds of a case the one with the least seconds; its row knows the most of them, and their number."""
+    if before is None or not _rounds(before, timing) or not _rounds(again, timing):
+        return again
+    best = min(before, again, key=lambda part: part.run["seconds"])
+    most = max(part.run["seconds_most"] for part in (before, again))
+    rounds = _rounds(before, timing) + 1
+    return replace(best, run={**best.run, "seconds_most": most, "rounds": rounds})
 
 
 def _study(study: Study | str | Path | Mapping[str, Any], overrides: Mapping[str, Any] | None, quick: bool) -> Study:
@@ -141,7 +177,8 @@ def _finished(study: Study, store: Store | None) -> dict[str, Part]:
 
 
 def _merged(study: Study, parts: Mapping[str, Part]) -> Frames:
-    return merge([parts[case.id] for case in study.cases if case.id in parts])
+    frames = merge([parts[case.id] for case in study.cases if case.id in parts])
+    return replace(frames, runs=with_predictions(frames.runs))
 
 
 def _of_case(case: str, frame: pd.DataFrame) -> pd.DataFrame:

@@ -1,6 +1,6 @@
 """Tables a study declares: one cell a run, rows and columns by parameter, the paper's values beside them.
 
-Or, of many runs: the cheapest within an error (`cheapest`), and how many there are (`count`).
+Or, of many runs: the cheapest within an error (`cheapest`), how many there are (`count`), who wins (`crossover`).
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ from rich.table import Table as RichTable
 from nlsolve.columns import RUNS
 from nlsolve.component import Component
 from nlsolve.condense import COUNT, NO_RUN, WITHIN, Cheapest, counted, key_of
+from nlsolve.crossover import Crossover
 from nlsolve.errors import ABSENT, Problem, StudyError, did_you_mean
 from nlsolve.outcomes import ACCEPTED, OUTCOME, outcome
 from nlsolve.papers import PaperValues
@@ -51,6 +52,9 @@ class TableSpec(Component):
     cheapest: Cheapest | None = Field(
         None, description="keep the cheapest run within each error only, of each of the rows and columns"
     )
+    crossover: Crossover | None = Field(
+        None, description="which strategy is cheapest by the ratio of factorisation to triangular solve"
+    )
     count: bool = Field(False, description="cells count runs, such as rows = variant, columns = outcome")
     paper: PaperValues | None = Field(None, description="a paper's values to compare with")
 
@@ -68,6 +72,11 @@ class TableSpec(Component):
     def _says_what_it_shows(self) -> TableSpec:
         if self.count and (self.value or self.cheapest is not None):
             raise ValueError(f"count = true shows numbers of runs; drop {'value' if self.value else 'cheapest'}")
+        if self.crossover is not None:
+            given = [name for name in ("rows", "columns", "value", "cheapest", "count", "paper") if getattr(self, name)]
+            if given:
+                raise ValueError(f"a crossover lays itself out; drop {given[0]}")
+            return self
         if not (self.count or self.value):
             raise ValueError("value is required, and missing: columns to show, or count = true")
         if not self.rows and self.cheapest is None:
@@ -85,11 +94,15 @@ class TableSpec(Component):
     @property
     def shown(self) -> Names:
         """Columns whose values are in the cells."""
+        if self.crossover is not None:
+            return self.crossover.shown
         return (COUNT,) if self.count else self.value
 
     @property
     def labels(self) -> Names:
         """Columns whose values tell the rows apart."""
+        if self.crossover is not None:
+            return self.crossover.labels
         return self.rows if self.cheapest is None else (WITHIN, *self.rows)
 
     def condensed(self, runs: Sequence[Mapping[str, Any]]) -> Sequence[Mapping[str, Any]]:
@@ -97,6 +110,8 @@ class TableSpec(Component):
         layout = (*self.rows, *self.columns)
         if self.cheapest is not None:
             return self.cheapest.of(runs, layout)
+        if self.crossover is not None:
+            return self.crossover.of(runs)
         return counted(runs, layout) if self.count else runs
 
     def text(self, value: Any) -> str:
@@ -204,6 +219,7 @@ def check(spec: TableSpec, runs: Sequence[Mapping[str, Any]], measured: Iterable
     """
     known = list(dict.fromkeys([*measured, *(name for run in runs for name in run)]))
     contest = () if spec.cheapest is None else (spec.cheapest.cost, spec.cheapest.error)
+    axes = {} if spec.crossover is None else spec.crossover.columns_of_runs()
     problems = [
         Problem(place, name, f"no such column of the results; {did_you_mean(name, known)}")
         for place, names in [
@@ -213,6 +229,7 @@ def check(spec: TableSpec, runs: Sequence[Mapping[str, Any]], measured: Iterable
             (("where",), spec.where),
             (("cheapest", "cost"), contest[:1]),
             (("cheapest", "error"), contest[1:]),
+            *((("crossover", field), columns) for field, columns in axes.items()),
         ]
         for name in names
         if name not in known
@@ -225,7 +242,7 @@ def check(spec: TableSpec, runs: Sequence[Mapping[str, Any]], measured: Iterable
     if not chosen:
         asked = ", ".join(f"{name} = {value!r}" for name, value in spec.where.items())
         return [Problem(("where",), ABSENT, f"no case has these values: {asked}")]
-    if spec.count or spec.cheapest is not None:
+    if spec.count or spec.cheapest is not None or spec.crossover is not None:
         return []
     cells: dict[tuple[Any, ...], Mapping[str, Any]] = {}
     for run in chosen:

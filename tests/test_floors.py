@@ -20,7 +20,8 @@ FLOORS = [
     "laws scenes discretizers linear problems solvers",
     "flow tangent pressure motion march measures audit ledger driver",
     "hookspecs registry",
-    "studies locate errors outcomes condense sweeps runner store tables papers report plan diagnose figures",
+    "studies locate errors outcomes condense sweeps runner store tables papers report plan diagnose figures "
+    "costs predictions envelope crossover",
     "testing small cli progress __init__",
 ]
 FLOOR = {name: number for number, names in enumerate(FLOORS) for name in names.split()}

@@ -1,4 +1,5 @@
-"""Figures a study declares: curves, maps and trades of runs, curves of steps, clouds, profiles and fields, for print.
+"""Figures a study declares, for print: curves, maps, trades and crossovers of runs, curves of steps, clouds, profiles,
+fields.
 
 A figure is a validated value like everything else in a study; `draw` turns it and the result frames into a
 `matplotlib.figure.Figure` without touching pyplot, `save` writes it as PNG and PDF, the same bytes every time.
@@ -16,6 +17,7 @@ from pydantic import Field
 
 from nlsolve.figures.base import BaseFigure, FigureError, Frames
 from nlsolve.figures.cloud import CloudFigure
+from nlsolve.figures.crossover import CrossoverFigure
 from nlsolve.figures.field import FieldFigure
 from nlsolve.figures.line import LineFigure
 from nlsolve.figures.map import MapFigure
@@ -26,6 +28,7 @@ from nlsolve.figures.trade import TradeFigure
 __all__ = [
     "BaseFigure",
     "CloudFigure",
+    "CrossoverFigure",
     "FieldFigure",
     "FigureError",
     "FigureSpec",
@@ -39,7 +42,8 @@ __all__ = [
 ]
 
 FigureSpec = Annotated[
-    LineFigure | MapFigure | TradeFigure | CloudFigure | ProfileFigure | FieldFigure, Field(discriminator="kind")
+    LineFigure | MapFigure | TradeFigure | CrossoverFigure | CloudFigure | ProfileFigure | FieldFigure,
+    Field(discriminator="kind"),
 ]
 """What a study's `[[figure]]` may be."""
 
