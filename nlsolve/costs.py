@@ -32,7 +32,7 @@ PREFIX = "unit."
 ROUNDS = 5
 """How often all kinds of work are timed in turn."""
 
-FEWEST_ROUNDS, ENOUGH_SECONDS = 2, 2.0
+FEWEST_ROUNDS, ENOUGH_SECONDS = 2, 1.0
 """Rounds that are made however long they take, and seconds after which no further one is begun."""
 
 ORDER = 20

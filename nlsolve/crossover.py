@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Annotated, Any, ClassVar
+from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
 from pydantic import BeforeValidator, Field
@@ -65,9 +65,8 @@ class Crossover(Component):
 
     noun: ClassVar[str] = "crossover"
 
-    report: str = Field(
+    report: Literal["cells", "lines"] = Field(
         "cells",
-        pattern="^(cells|lines)$",
         description="cells: predicted and measured winner with each linear solver at each size; lines: where each "
         "strategy wins",
     )
