@@ -121,14 +121,25 @@ class UnitCosts:
         return cls(**{kind: float(run[PREFIX + kind]) for kind in cls.__dataclass_fields__})
 
 
-def calibrate(setup: Setup) -> UnitCosts:
-    """Unit costs of a case that has not been run, on the cloud it begins with (see `march.sample`).
+@dataclass(frozen=True)
+class Calibration:
+    """What a case that has not been run costs: its size, seconds of its operators, and unit costs."""
 
-    Raises SolveError where the cloud or its first tangent is bad.
+    nodes: int
+    unknowns: int
+    operators: float
+    unit: UnitCosts
+
+
+def calibrate(setup: Setup, rounds: int = ROUNDS) -> Calibration:
+    """On the cloud a case begins with (see `march.sample`), in seconds of the processor: a forecast does not know what
+    else the machine will do. Raises SolveError where the cloud or its first tangent is bad.
     """
+    clock = CLOCKS["processor"]
     with threadpool_limits(limits=1):
-        problem, state, _ = sample(setup)
-        return measure(problem, setup.linear, state)
+        problem, state, ledger = sample(setup, clock)
+        unit = measure(problem, setup.linear, state, rounds, clock)
+    return Calibration(len(problem.cloud.nodes), len(state), ledger.seconds["operators"], unit)
 
 
 @np.errstate(all="ignore")

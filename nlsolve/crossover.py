@@ -188,4 +188,11 @@ def _cell_rows(cells: Sequence[Cell]) -> list[dict[str, Any]]:
 
 
 def _words(names: tuple[str, ...], run: Run) -> str:
-    return ", ".join(str(word) for word in key_of(names, run) if word != NO_RUN) or NO_RUN
+    """ "anm, order 20": words as they are, numbers behind their column."""
+    found = []
+    for name, value in zip(names, key_of(names, run), strict=True):
+        if not np.isnan(number(value)):
+            found.append(f"{name.rpartition('.')[2]} {value:g}")
+        elif value != NO_RUN:
+            found.append(str(value))
+    return ", ".join(found) or NO_RUN

@@ -98,13 +98,13 @@ def march(
     return _March(setup, listen or (lambda progress: None), clock).run()
 
 
-def sample(setup: Setup) -> tuple[Flow, Array, Ledger]:
+def sample(setup: Setup, clock: Callable[[], float] = time.perf_counter) -> tuple[Flow, Array, Ledger]:
     """The balance of a case at t = 0, a state for it, and the books of its operators; nothing is iterated.
 
     The state is one Newton step away from rest under the easiest law of the way to the first state: where that law is
     Newtonian, the flow of a Newtonian material. Raises SolveError.
     """
-    case = _March(setup, lambda progress: None)
+    case = _March(setup, lambda progress: None, clock)
     case.begin()
     easiest = case.flow_of(setup.law.continuation(setup.start.by, setup.start.values)[0])
     rest = easiest.unknowns(case.velocity)
@@ -117,9 +117,7 @@ def sample(setup: Setup) -> tuple[Flow, Array, Ledger]:
 class _March:
     """The state of one case on its way: cloud, operators, velocity, and the books of the start and of the march."""
 
-    def __init__(
-        self, setup: Setup, listen: Callable[[Progress], None], clock: Callable[[], float] = time.perf_counter
-    ) -> None:
+    def __init__(self, setup: Setup, listen: Callable[[Progress], None], clock: Callable[[], float]) -> None:
         self.setup, self.scene, self.listen, self.clock = setup, setup.scene, listen, clock
         self.start_ledger, self.ledger = Ledger(clock), Ledger(clock)
         self.start_tangent = Tangent(setup.linear, None, self.start_ledger)

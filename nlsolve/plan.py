@@ -6,10 +6,9 @@ import math
 from typing import Any
 
 import pandas as pd
-from threadpoolctl import threadpool_limits
 
-from nlsolve.costs import measure
-from nlsolve.march import Setup, sample
+from nlsolve.costs import calibrate
+from nlsolve.march import Setup
 from nlsolve.status import SolveError
 from nlsolve.studies import Study
 
@@ -63,19 +62,17 @@ def forecast(study: Study) -> pd.DataFrame:
 
 
 def costs_of(setup: Setup) -> dict[str, Any]:
-    """Sizes and timings [s] of one scene at the state of `march.sample`; all NaN when its cloud is bad."""
+    """Sizes and timings [s] of one scene at its first cloud; all NaN when that is bad."""
     try:
-        with threadpool_limits(limits=1):
-            problem, state, ledger = sample(setup)
-            unit = measure(problem, setup.linear, state, rounds=1)
+        found = calibrate(setup, rounds=1)
     except SolveError:
         return dict.fromkeys(SAMPLE, math.nan)
     return {
-        "nodes": len(problem.cloud.nodes),
-        "unknowns": len(state),
-        "seconds_operators": ledger.seconds["operators"],
-        "seconds_factorization": unit.factorization,
-        "seconds_triangular_solve": unit.triangular_solve,
-        "seconds_iteration": unit.predict(ITERATION),
-        "seconds_increment": unit.predict(INCREMENT),
+        "nodes": found.nodes,
+        "unknowns": found.unknowns,
+        "seconds_operators": found.operators,
+        "seconds_factorization": found.unit.factorization,
+        "seconds_triangular_solve": found.unit.triangular_solve,
+        "seconds_iteration": found.unit.predict(ITERATION),
+        "seconds_increment": found.unit.predict(INCREMENT),
     }

@@ -30,6 +30,7 @@ from nlsolve.errors import StudyError
 from nlsolve.figures import BaseFigure, FigureError, FigureSpec, draw
 from nlsolve.figures.style import ACCENT
 from nlsolve.march import Record, march, sample
+from nlsolve.plan import forecast
 from nlsolve.predictions import UNITS, with_predictions
 from nlsolve.runner import run as run_study
 from nlsolve.small import SmallProblem
@@ -145,7 +146,11 @@ def test_a_tangent_that_cannot_be_factorised_is_an_error_with_its_status() -> No
 
 def test_calibration_of_a_case_is_finite_and_predicts_more_for_more_work() -> None:
     case = setup(StirringTool(nodes=Rings(spacing=0.75), horizon=2e-4, motion_of_nodes="lagrangian", inertia=True))
-    unit = calibrate(case)
+    found = calibrate(case, rounds=2)
+    unit = found.unit
+    cloud = case.scene.cloud(case.law)
+    assert (found.nodes, found.unknowns) == (len(cloud.nodes), 2 * len(cloud.interior))
+    assert found.operators > 0.0
     costs = np.array(list(unit.columns().values()))
     assert np.isfinite(costs).all()
     assert (costs[:-2] > 0.0).all()
@@ -153,6 +158,20 @@ def test_calibration_of_a_case_is_finite_and_predicts_more_for_more_work() -> No
     assert costs[-2:].sum() > 0.0
     less, more = unit.predict({"triangular_solves": 3}), unit.predict({"triangular_solves": 3, "residuals": 1})
     assert 0.0 < less < more
+
+
+def test_a_bad_cloud_cannot_be_calibrated_and_a_forecast_leaves_it_open() -> None:
+    document = {
+        "question": "?",
+        "scene": {"kind": "stirring-tool", "nodes": {"kind": "rings", "spacing": 0.75}},
+        "law": {"kind": "power-law", "index": 0.5},
+        "discretizer": {"kind": "mls", "support": 5000},
+        "solver": {"kind": "newton"},
+    }
+    study = Study.from_dict(document)
+    with pytest.raises(SolveError):
+        calibrate(study.cases[0].setup)
+    assert forecast(study)[["nodes", "seconds", "seconds_all"]].isna().all(axis=None)
 
 
 def test_the_state_of_a_sample_is_the_newtonian_flow() -> None:
@@ -345,9 +364,9 @@ def test_wins_for_people() -> None:
 def test_cells_of_exact_runs() -> None:
     rows = Crossover().of(records(told()))
     assert [(row["size"], row["backend"], row["verdict"]) for row in rows[:3]] == [
-        ("100", "fine", SAME),
-        ("100", "coarse", SAME),
-        ("100", "steep", SAME),
+        ("nodes 100", "fine", SAME),
+        ("nodes 100", "coarse", SAME),
+        ("nodes 100", "steep", SAME),
     ]
     assert [row["ratio"] for row in rows[:3]] == pytest.approx([40.0, 10.0, 200.0])
     assert [row["measured"] for row in rows[:3]] == ["chord", "chord", "chord"]
@@ -380,7 +399,17 @@ def test_lines_of_exact_runs() -> None:
     assert [row["wins"] for row in rows[:3]] == ["0 … 4.57", "4.57 … 350", "350 … ∞"]
     assert [row["beats chord"] for row in rows[:3]] == ["below 4.57", "never", "above 350"]
     assert [row["at best"] for row in rows[:3]] == ["1", "1", "1"]
-    assert [row["size"] for row in rows] == ["100"] * 3 + ["400"] * 3
+    assert [row["size"] for row in rows] == ["nodes 100"] * 3 + ["nodes 400"] * 3
+
+
+def test_numbers_are_called_by_their_columns() -> None:
+    runs = told(**{"discretizer.kind": "grid"})
+    asked = Crossover(strategy="solver.number", size=["discretizer.kind", "nodes"], report="lines")
+    rows = asked.of(records(runs))
+    assert [(row["size"], row["strategy"]) for row in rows[:2]] == [
+        ("grid, nodes 100", "number 0"),
+        ("grid, nodes 100", "number 1"),
+    ]
 
 
 def test_failed_runs_take_no_part() -> None:
@@ -397,10 +426,10 @@ def spec(**fields: Any) -> TableSpec:
 def test_tables_lay_themselves_out() -> None:
     table = build(spec(), told())
     assert list(table.cells.columns) == list(Crossover().shown)
-    assert table.cells.loc[("100", "fine"), "predicted"] == "chord"
+    assert table.cells.loc[("nodes 100", "fine"), "predicted"] == "chord"
     assert table.cells.loc[("all", "–"), "verdict"] == "6 of 6 same, 6 with ties"
     lines = build(spec(report="lines", against="chord"), told())
-    assert lines.words.loc[("400", "series"), "beats chord"] == "above 350"
+    assert lines.words.loc[("nodes 400", "series"), "beats chord"] == "above 350"
     assert "4.57 … 350" in lines.markdown()
 
 
@@ -410,7 +439,7 @@ def test_tables_lay_themselves_out() -> None:
         ({"strategy": "variants"}, "'variants'|did you mean 'variant'"),
         ({"size": ["nodes", "node"]}, "did you mean 'nodes'"),
         ({"backend": "linear.order"}, "did you mean 'linear.ordering'"),
-        ({"backend": "status"}, "3 runs are called 'newton' at 100 with converged: name a column"),
+        ({"backend": "status"}, "3 runs are called 'newton' at nodes 100 with converged: name a column"),
     ],
 )
 def test_reports_refuse(fields: dict[str, Any], sentence: str) -> None:

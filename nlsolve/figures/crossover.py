@@ -58,7 +58,7 @@ class CrossoverFigure(BaseFigure):
         across = np.geomspace(min(ratios) / MARGIN, max(ratios) * MARGIN, POINTS)
         for panel, reference, (size, members) in zip(panels, references(cells), sizes.items(), strict=False):
             self._panel(panel, reference, members, strategies, across)
-            panel.set_title(join(f"{self.size[0].rpartition('.')[2]} {size}", _told(members)))
+            panel.set_title(join(size, _told(members)))
         figure.supxlabel("factorisation / triangular solve", fontsize=9)
         figure.supylabel("cost [triangular solves]", fontsize=9)
         if self.title:
