@@ -29,7 +29,7 @@ from nlsolve.tables import Table, build
 class Event:
     """What a listener is told: a case begins (no progress, no run), advances (progress), or has ended (its run).
 
-    number : of the case, from 1.
+    number : of the case, from 1; where cases are timed in several rounds, of its turn among `cases` turns.
     resumed : the run was read from the results folder instead of computed.
     """
 

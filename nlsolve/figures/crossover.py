@@ -54,6 +54,8 @@ class CrossoverFigure(BaseFigure):
         panels = figure.subplots(rows, columns, sharex=True, squeeze=False).ravel()
         for panel in panels[len(sizes) :]:
             panel.remove()
+        for panel in panels[max(0, len(sizes) - columns) : len(sizes)]:  # the lowest of each column
+            panel.tick_params(labelbottom=True)
         ratios = [cell.unit.ratio for cell in cells]
         across = np.geomspace(min(ratios) / MARGIN, max(ratios) * MARGIN, POINTS)
         for panel, reference, (size, members) in zip(panels, references(cells), sizes.items(), strict=False):
