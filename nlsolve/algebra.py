@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -70,9 +71,13 @@ class Algebraic(NonlinearProblem):
 
 
 @np.errstate(all="ignore")  # what is not finite becomes a status, a doubt or a NaN
-def solve_system(setup: AlgebraicSetup, listen: Callable[[Progress], None] | None = None) -> Record:
-    """Run one case; every ending, failure included, is in the record."""
-    ledger = Ledger()
+def solve_system(
+    setup: AlgebraicSetup,
+    listen: Callable[[Progress], None] | None = None,
+    clock: Callable[[], float] = time.process_time,
+) -> Record:
+    """Run one case; every ending, failure included, is in the record. `clock` is what its seconds are told by."""
+    ledger = Ledger(clock)
     tangent = Tangent(setup.linear, setup.refresh, ledger)
     with ledger.entry("operators"):
         problem = Algebraic(setup.scene)
@@ -108,7 +113,12 @@ def solve_system(setup: AlgebraicSetup, listen: Callable[[Progress], None] | Non
     rows = [{"increment": 0, "accepted": False, **row} for row in outcome.steps]
     if solved:
         rows[-1]["accepted"] = True
-    return Record(summary, pd.DataFrame(rows, columns=[name for name in STEPS if name != "case"]))
+    return Record(
+        summary,
+        pd.DataFrame(rows, columns=[name for name in STEPS if name != "case"]),
+        problem=problem,
+        state=outcome.state,
+    )
 
 
 def root_error(system: System, u: Array) -> float:

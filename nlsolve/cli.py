@@ -137,9 +137,9 @@ def plan(study: StudyFile, settings: Settings = None, quick: Quick = False, as_j
         typer.echo(json.dumps({"assumption": ASSUMPTION, "cases": records(frame)}))
         return
     swept = list(dict.fromkeys(name for case in checked.cases for name in case.swept))
-    sizes = ["increments", "nodes", "unknowns", "seconds_factorization", "seconds"]
+    sizes = ["increments", "nodes", "unknowns", "seconds_factorization", "seconds_start", "seconds", "seconds_all"]
     print_frame(count(len(frame)), frame[["case", *swept, *sizes]])
-    typer.echo(f"{frame['seconds'].sum():.3g} s in all ({ASSUMPTION})")
+    typer.echo(f"{frame['seconds_all'].sum() * checked.timing.rounds:.3g} s in all ({ASSUMPTION})")
 
 
 @app.command()

@@ -29,20 +29,22 @@ KINDS = ("residual", "jacobian", "matrix_product", "factorization", "triangular_
 class Ledger:
     """Counts and seconds by kind of work; the kind "method" holds the time spent inside a method, all included.
 
-    Seconds are processor seconds of this process, which other programs on the machine do not lengthen.
+    clock : seconds since some moment; those the processor worked for this process, which other programs do not
+        lengthen, or those that passed.
     """
 
+    clock: Callable[[], float] = time.process_time
     counts: Counter[str] = field(default_factory=Counter)
     seconds: Counter[str] = field(default_factory=Counter)
 
     @contextmanager
     def entry(self, kind: str) -> Iterator[None]:
         """Count one piece of work of this kind and the time it takes, even if it fails."""
-        begun = time.process_time()
+        begun = self.clock()
         try:
             yield
         finally:
-            self.seconds[kind] += time.process_time() - begun  # type: ignore[assignment]
+            self.seconds[kind] += self.clock() - begun  # type: ignore[assignment]
             self.counts[kind] += 1
 
     def work(self) -> dict[str, float]:
@@ -60,12 +62,23 @@ class Ledger:
             "seconds_residual": self.seconds["residual"],
             "seconds_series": self.seconds["series_order"],
             "seconds_operators": self.seconds["operators"],
+            **self.details(),
             "factor_solve_ratio": self.each("factorization") / self.each("triangular_solve"),
         }
 
     def each(self, kind: str) -> float:
         """Mean seconds of one piece of work of this kind; NaN when there was none."""
         return self.seconds[kind] / self.counts[kind] if self.counts[kind] else float("nan")
+
+    def details(self) -> dict[str, float]:
+        """What a cost model wants to know besides the counts and seconds by kind, by the names of `nlsolve.columns`."""
+        asked_for = sum(self.seconds[kind] for kind in KINDS)
+        return {
+            "expansions": self.counts["expansion"],
+            "series_terms": self.counts["series_term"],
+            "matrix_products": self.counts["matrix_product"],
+            "seconds_own": self.seconds["method"] - asked_for,
+        }
 
 
 class SealedMatrix:
@@ -187,6 +200,7 @@ def _view(problem: NonlinearProblem, ledger: Ledger, remember: Any, scales: Mapp
                 while known <= j:  # orders that are skipped over are work too; an order asked for again is not
                     with ledger.entry("series_order"):
                         expansion.coefficient(known)
+                    ledger.counts["series_term"] += known  # order j convolves j earlier terms
                     known += 1
                 return expansion.coefficient(j)
 
@@ -234,6 +248,7 @@ def _view(problem: NonlinearProblem, ledger: Ledger, remember: Any, scales: Mapp
             with ledger.entry("residual"):
                 expansion = problem.expand(u)
                 expansion.coefficient(0)
+            ledger.counts["expansion"] += 1
             return CountedExpansion(expansion)
 
         def scale(self, u: Array) -> float:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -23,6 +24,7 @@ from nlsolve.measures import divergence, nodal_fields, velocity_error, wall_reac
 from nlsolve.motion import Markers, MovingNodes
 from nlsolve.predictors import Predictor
 from nlsolve.pressure import Mixing
+from nlsolve.problems import NonlinearProblem
 from nlsolve.scenes import Scene
 from nlsolve.series import Array
 from nlsolve.solvers import NonlinearSolver, RefreshRule
@@ -64,11 +66,16 @@ class Progress:
 
 @dataclass(frozen=True)
 class Record:
-    """What one case leaves: its row of `runs`, its rows of `steps`, its `fields` (a row a node and recorded time)."""
+    """What one case leaves: its row of `runs`, its rows of `steps`, its `fields` (a row a node and recorded time).
+
+    problem, state : the last that was solved, None before the first; for measuring what work on them costs.
+    """
 
     summary: dict[str, Any]
     steps: pd.DataFrame
     fields: pd.DataFrame = field(default_factory=pd.DataFrame)
+    problem: NonlinearProblem | None = None
+    state: Array | None = None
 
 
 def reported(rows: Sequence[Mapping[str, Any]]) -> dict[str, float | None]:
@@ -77,17 +84,38 @@ def reported(rows: Sequence[Mapping[str, Any]]) -> dict[str, float | None]:
     return {name: sum(numbers) if numbers else None for name, numbers in said.items()}
 
 
-def march(setup: Setup, listen: Callable[[Progress], None] | None = None) -> Record:
-    """Run one case; every ending, failure included, is in the record."""
-    return _March(setup, listen or (lambda progress: None)).run()
+def march(
+    setup: Setup,
+    listen: Callable[[Progress], None] | None = None,
+    clock: Callable[[], float] = time.process_time,
+) -> Record:
+    """Run one case; every ending, failure included, is in the record. `clock` is what its seconds are told by."""
+    return _March(setup, listen or (lambda progress: None), clock).run()
+
+
+def sample(setup: Setup, clock: Callable[[], float] = time.process_time) -> tuple[Flow, Array, Ledger]:
+    """The balance of a case at t = 0, a state for it, and the books of its operators; nothing is iterated.
+
+    The state is one Newton step away from rest under the easiest law of the way to the first state: where that law is
+    Newtonian, the flow of a Newtonian material. Raises SolveError.
+    """
+    case = _March(setup, lambda progress: None, clock)
+    case.begin()
+    first = setup.start.stages(setup.law)[0]
+    easiest = case.flow_of(first.law, load=first.load)
+    rest = easiest.unknowns(case.velocity)
+    factors = setup.linear.factorize(easiest.jacobian(rest))
+    state = rest - factors.solve(easiest.residual(rest))
+    case.keep(easiest, state)
+    return case.flow_of(setup.law), state, case.ledger
 
 
 class _March:
     """The state of one case on its way: cloud, operators, velocity, and the books of the start and of the march."""
 
-    def __init__(self, setup: Setup, listen: Callable[[Progress], None]) -> None:
-        self.setup, self.scene, self.listen = setup, setup.scene, listen
-        self.start_ledger, self.ledger = Ledger(), Ledger()
+    def __init__(self, setup: Setup, listen: Callable[[Progress], None], clock: Callable[[], float]) -> None:
+        self.setup, self.scene, self.listen, self.clock = setup, setup.scene, listen, clock
+        self.start_ledger, self.ledger = Ledger(clock), Ledger(clock)
         self.start_tangent = Tangent(setup.linear, None, self.start_ledger)
         self.tangent = Tangent(setup.linear, setup.refresh, self.ledger)
         self.volumetric = bool(self.scene.penalty)
@@ -398,4 +426,4 @@ class _March:
             summary |= audit(self.scene, discretizer, flow, velocity, change, reached, **estimates)
         steps = pd.DataFrame(self.rows, columns=[name for name in STEPS if name != "case"])
         fields = pd.concat(self.snapshots, ignore_index=True) if self.snapshots else pd.DataFrame()
-        return Record(summary, steps, fields)
+        return Record(summary, steps, fields, self.flow, None if self.flow is None else self.unknowns)

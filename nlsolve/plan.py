@@ -1,28 +1,43 @@
-"""What a study will do and about what it will cost, told from one factorisation for every scene in it."""
+"""What a study will do and about what it will cost, told from unit costs measured once for every scene in it."""
 
 from __future__ import annotations
 
 import math
-import time
-from collections.abc import Callable
 from typing import Any
 
-import numpy as np
 import pandas as pd
 
-from nlsolve.algebra import Algebraic, AlgebraicSetup
+from nlsolve.algebra import AlgebraicSetup
 from nlsolve.component import Component
+from nlsolve.costs import calibrate
 from nlsolve.march import Setup
 from nlsolve.status import SolveError
 from nlsolve.studies import Study
 
 SOLVES = 20
-"""Pairs of triangular solves an increment is taken to need: about one series."""
+"""Pairs of triangular solves, and residuals, an increment is taken to need: about one series."""
 
-ASSUMPTION = f"forecast: one factorisation and {SOLVES} pairs of triangular solves an increment"
+STAGE = 5
+"""Newton iterations taken for each law on the way to the first state."""
+
+ASSUMPTION = (
+    f"forecast: {STAGE} Newton iterations for each law on the way to the first state, then one factorisation and "
+    f"{SOLVES} pairs of triangular solves an increment"
+)
 """Newton needs several factorisations an increment, a kept tangent far fewer than one."""
 
-SAMPLE = ["nodes", "unknowns", "seconds_operators", "seconds_factorization", "seconds_triangular_solve"]
+INCREMENT = {"factorizations": 1, "jacobians": 1, "triangular_solves": SOLVES, "residuals": SOLVES}
+ITERATION = {"factorizations": 1, "jacobians": 1, "triangular_solves": 1, "residuals": 1}
+
+SAMPLE = [
+    "nodes",
+    "unknowns",
+    "seconds_operators",
+    "seconds_factorization",
+    "seconds_triangular_solve",
+    "seconds_iteration",
+    "seconds_increment",
+]
 
 
 def forecast(study: Study) -> pd.DataFrame:
@@ -31,60 +46,40 @@ def forecast(study: Study) -> pd.DataFrame:
     rows = []
     for case in study.cases:
         setup = case.setup
-        increments = clouds = 1
+        increments, clouds, stages = 1, 1, 0
         parts: list[Component] = [setup.scene, setup.linear]
         if isinstance(setup, Setup):
             parts += [setup.law, setup.discretizer]
             increments = max(1, setup.scene.increments)
-            clouds = increments if setup.scene.motion_of_nodes != "fixed" else 1
+            clouds = 1 + (increments if setup.scene.motion_of_nodes != "fixed" else 0)
+            stages = len(setup.start.stages(setup.law))
         key = "".join(part.model_dump_json() for part in parts)
         if key not in measured:
-            measured[key] = sample(setup) if isinstance(setup, Setup) else sample_of_system(setup)
+            measured[key] = costs_of(setup)
         costs = measured[key]
-        each = costs["seconds_factorization"] + SOLVES * costs["seconds_triangular_solve"]
-        rows.append(
-            {
-                "case": case.id,
-                **{name: case.parameters[name] for name in case.swept},
-                "increments": increments,
-                **costs,
-                "seconds": increments * each + clouds * costs["seconds_operators"],
-            }
-        )
+        seconds = {
+            "seconds_start": STAGE * stages * costs["seconds_iteration"],
+            "seconds": increments * costs["seconds_increment"],
+        }
+        seconds["seconds_all"] = sum(seconds.values()) + clouds * costs["seconds_operators"]
+        swept = {name: case.parameters[name] for name in case.swept}
+        rows.append({"case": case.id, **swept, "increments": increments, **costs, **seconds})
     return pd.DataFrame(rows)
 
 
-def sample(setup: Setup) -> dict[str, float]:
-    """Sizes and timings [s] of one scene with the operators' own matrix S·2B; all NaN when the cloud is bad."""
+def costs_of(setup: Setup | AlgebraicSetup) -> dict[str, Any]:
+    """Sizes and timings [s] of one scene at its first cloud, or of a system; all NaN when that is bad."""
     try:
-        cloud = setup.scene.cloud(setup.law)
-        operators, seconds_operators = _timed(lambda: setup.discretizer.operators(cloud, bool(setup.scene.penalty)))
-        inside = np.stack([2 * cloud.interior, 2 * cloud.interior + 1], axis=1).ravel()
-        matrix = (operators.force @ (2.0 * operators.strain.tocsc()[:, inside])).tocsc()
-        factors, seconds_factorization = _timed(lambda: setup.linear.factorize(matrix))
-        _, seconds_solve = _timed(lambda: factors.solve(np.ones(matrix.shape[0])))
+        found = calibrate(setup, rounds=1)
     except SolveError:
-        return dict.fromkeys(SAMPLE, math.nan)
-    found = (len(cloud.nodes), len(inside), seconds_operators, seconds_factorization, seconds_solve)
-    return dict(zip(SAMPLE, found, strict=True))
-
-
-@np.errstate(all="ignore")
-def sample_of_system(setup: AlgebraicSetup) -> dict[str, float]:
-    """The same of a system, with the Jacobian at its start; NaN for what cannot be timed where that is singular."""
-    problem, seconds_operators = _timed(lambda: Algebraic(setup.scene))
-    start = setup.scene.start()
-    found = {**dict.fromkeys(SAMPLE, math.nan), "unknowns": len(start), "seconds_operators": seconds_operators}
-    try:
-        matrix = problem.jacobian(start)
-        factors, found["seconds_factorization"] = _timed(lambda: setup.linear.factorize(matrix))
-        _, found["seconds_triangular_solve"] = _timed(lambda: factors.solve(np.ones(len(start))))
-    except SolveError:
-        return found
-    return found
-
-
-def _timed(work: Callable[[], Any]) -> tuple[Any, float]:
-    begun = time.process_time()
-    value = work()
-    return value, time.process_time() - begun
+        known = {"unknowns": len(setup.scene.start())} if isinstance(setup, AlgebraicSetup) else {}
+        return {**dict.fromkeys(SAMPLE, math.nan), **known}
+    return {
+        "nodes": found.nodes,
+        "unknowns": found.unknowns,
+        "seconds_operators": found.operators,
+        "seconds_factorization": found.unit.factorization,
+        "seconds_triangular_solve": found.unit.triangular_solve,
+        "seconds_iteration": found.unit.predict(ITERATION),
+        "seconds_increment": found.unit.predict(INCREMENT),
+    }

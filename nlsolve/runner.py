@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 import traceback
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -13,12 +13,16 @@ import pandas as pd
 from threadpoolctl import threadpool_limits
 
 from nlsolve.algebra import solve_system
+from nlsolve.costs import CLOCKS, Timing, measure
 from nlsolve.errors import StudyError, did_you_mean
 from nlsolve.figures import FigureError, Frames, draw, save
-from nlsolve.march import Progress, Setup, march
+from nlsolve.linear import LinearSolver
+from nlsolve.march import Progress, Record, Setup, march
+from nlsolve.outcomes import number
+from nlsolve.predictions import UNITS, with_predictions
 from nlsolve.references import with_reference_errors
 from nlsolve.report import write_report
-from nlsolve.status import Status
+from nlsolve.status import SolveError, Status
 from nlsolve.store import Part, Store, merge
 from nlsolve.studies import Case, Study
 from nlsolve.tables import Table, build
@@ -28,7 +32,7 @@ from nlsolve.tables import Table, build
 class Event:
     """What a listener is told: a case begins (no progress, no run), advances (progress), or has ended (its run).
 
-    number : of the case, from 1.
+    number : of the case, from 1; where cases are timed in several rounds, of its turn among `cases` turns.
     resumed : the run was read from the results folder instead of computed.
     """
 
@@ -97,20 +101,22 @@ def run(
     store = None if out is None else Store(Path(out), study)
     tell = listen or (lambda event: None)
     parts = _finished(study, store)
+    turns = [(turn, case) for turn in range(1, study.timing.rounds + 1) for case in study.cases]
     written = time.monotonic()
     try:
-        for number, case in enumerate(study.cases, 1):
-            begun = Event(case, number, len(study.cases))
-            resumed = case.id in parts
+        for position, (turn, case) in enumerate(turns, 1):
+            begun = Event(case, position, len(turns))
+            resumed = case.id in parts and _rounds(parts[case.id], study.timing) >= turn
             if not resumed:
                 tell(begun)
-                parts[case.id] = execute(case, number, len(study.cases), tell)
+                again = execute(case, position, len(turns), tell, study.timing)
+                parts[case.id] = _fastest(parts.get(case.id), again, study.timing)
                 if store is not None:
                     store.save(parts[case.id])
                     if time.monotonic() - written > SECONDS_BETWEEN_FRAMES:
                         store.write_frames(_merged(study, parts))
                         written = time.monotonic()
-            tell(Event(case, number, len(study.cases), run=parts[case.id].run, resumed=resumed))
+            tell(Event(case, position, len(turns), run=parts[case.id].run, resumed=resumed))
     finally:
         if store is not None:
             store.write_frames(_merged(study, parts))
@@ -120,21 +126,54 @@ def run(
     return Results(study, frames.runs, frames.steps, frames.fields, store.folder, _show(store, study, frames))
 
 
-def execute(case: Case, number: int, cases: int, tell: Listener) -> Part:
+def execute(case: Case, number: int, cases: int, tell: Listener, timing: Timing) -> Part:
     """March one case, or solve its system. Whatever it raises, an interruption excepted, becomes a row that says so."""
     try:
         with threadpool_limits(limits=1):
-            setup, listen = case.setup, lambda progress: tell(Event(case, number, cases, progress=progress))
-            record = march(setup, listen) if isinstance(setup, Setup) else solve_system(setup, listen)
+            clock, setup = CLOCKS[timing.clock], case.setup
+
+            def listen(progress: Progress) -> None:
+                tell(Event(case, number, cases, progress=progress))
+
+            record = march(setup, listen, clock) if isinstance(setup, Setup) else solve_system(setup, listen, clock)
+            units = unit_costs(record, setup.linear, clock) if timing.calibrate else {}
     except Exception as error:  # the one boundary at which a crash turns into a result
         place = traceback.extract_tb(error.__traceback__)[-1]
         message = f"{type(error).__name__}: {error} ({place.filename}:{place.lineno})"
         summary: dict[str, Any] = {"status": Status.CRASHED.word, "message": message}
         steps = fields = pd.DataFrame()
     else:
-        summary, steps, fields = record.summary, record.steps, record.fields
+        timed = {"rounds": 1, "seconds_most": record.summary.get("seconds"), "clock": timing.clock}
+        summary, steps, fields = {**record.summary, **timed, **units}, record.steps, record.fields
     row = {"case": case.id, **summary, **case.parameters}
     return Part(row, _of_case(case.id, steps), _of_case(case.id, fields))
+
+
+def unit_costs(record: Record, linear: LinearSolver, clock: Callable[[], float]) -> dict[str, float]:
+    """What work on the last problem of a march costs, as columns of `runs`; NaN where there is none to be measured."""
+    nothing = dict.fromkeys(UNITS, float("nan"))
+    if record.problem is None or record.state is None:
+        return nothing
+    try:
+        return measure(record.problem, linear, record.state, clock=clock).columns()
+    except SolveError:  # the tangent at the end of the march, which its status tells of, cannot be factorised
+        return nothing
+
+
+def _rounds(part: Part, timing: Timing) -> int:
+    """How often a case has been timed in the way the study asks for; 0 as well for one that crashed."""
+    known, units = number(part.run.get("rounds")), UNITS[0] in part.run or not timing.calibrate
+    return int(known) if known > 0 and units and part.run.get("clock") == timing.clock else 0
+
+
+def _fastest(before: Part | None, again: Part, timing: Timing) -> Part:
+    """Of the rounds of a case the one with the least seconds; its row knows the most of them, and their number."""
+    if before is None or not _rounds(before, timing) or not _rounds(again, timing):
+        return again
+    best = min(before, again, key=lambda part: part.run["seconds"])
+    most = max(part.run["seconds_most"] for part in (before, again))
+    rounds = _rounds(before, timing) + 1
+    return replace(best, run={**best.run, "seconds_most": most, "rounds": rounds})
 
 
 def _study(study: Study | str | Path | Mapping[str, Any], overrides: Mapping[str, Any] | None, quick: bool) -> Study:
@@ -156,7 +195,9 @@ def _finished(study: Study, store: Store | None) -> dict[str, Part]:
 
 def _merged(study: Study, parts: Mapping[str, Part]) -> Frames:
     frames = merge([parts[case.id] for case in study.cases if case.id in parts])
-    return with_reference_errors(frames, {case.id: case.reference for case in study.cases if case.reference})
+    references = {case.id: case.reference for case in study.cases if case.reference}
+    frames = with_reference_errors(frames, references)
+    return replace(frames, runs=with_predictions(frames.runs))
 
 
 def _of_case(case: str, frame: pd.DataFrame) -> pd.DataFrame:

@@ -8,7 +8,7 @@ import json
 import re
 import tomllib
 from collections.abc import Mapping
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -17,6 +17,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, create_model
 from nlsolve.algebra import AlgebraicSetup
 from nlsolve.columns import RUNS
 from nlsolve.component import Component
+from nlsolve.costs import Timing
 from nlsolve.driver import Budget, StoppingTest
 from nlsolve.errors import ABSENT, Problem, Source, StudyError, did_you_mean, problems_in
 from nlsolve.figures import FigureSpec
@@ -30,7 +31,7 @@ from nlsolve.sweeps import Document, Point, Setting, Sweep, assign_all, leaves, 
 from nlsolve.systems import System
 from nlsolve.tables import TableSpec, check
 
-SECTIONS = tuple(field.name for field in fields(Setup))
+SECTIONS = tuple(part.name for part in fields(Setup))
 """The parts of a study that a case is made of, and that can be swept."""
 
 DEFAULT_KINDS = {"linear": {"kind": "superlu"}, "starter": {"kind": "newton"}, "predictor": {"kind": "previous"}}
@@ -60,6 +61,7 @@ class Frame(BaseModel):
     )
     table: tuple[TableSpec, ...] = ()
     figure: tuple[FigureSpec, ...] = ()
+    timing: Timing = Timing()
     quick: dict[str, Any] = Field(default_factory=dict, description="what --quick changes")
 
 
@@ -98,6 +100,7 @@ class Study:
     tables: tuple[TableSpec, ...] = ()
     figures: tuple[Any, ...] = ()
     has_quick: bool = False
+    timing: Timing = field(default_factory=Timing)
 
     @classmethod
     def from_toml(
@@ -181,14 +184,19 @@ class _Builder:
             problems += [Problem(("table", number, *wrong.place), wrong.value, wrong.expected) for wrong in found]
         known = list(dict.fromkeys([*RUNS, *(name for case in cases for name in case.parameters)]))
         problems += [
-            Problem(("figure", number, field), column, f"no such column of the results; {did_you_mean(column, known)}")
+            Problem(("figure", number, name), column, f"no such column of the results; {did_you_mean(column, known)}")
             for number, figure in enumerate(frame.figure)
-            for field, columns in figure.columns_of_runs().items()
+            for name, columns in figure.columns_of_runs().items()
             for column in columns
             if column not in known
         ]
+        if not frame.timing.calibrate:
+            lines = [("table", n) for n, spec in enumerate(frame.table) if spec.crossover is not None]
+            lines += [("figure", n) for n, spec in enumerate(frame.figure) if spec.kind == "crossover"]
+            asked = "a crossover is told from unit costs: set timing = { calibrate = true }"
+            problems += [Problem(place, ABSENT, asked) for place in lines]
         self.refuse(problems)
-        return Study(name, frame.question, cases, tuple(tables), frame.figure, bool(frame.quick))
+        return Study(name, frame.question, cases, tuple(tables), frame.figure, bool(frame.quick), frame.timing)
 
     def refuse(self, problems: list[Problem]) -> None:
         self.refuse_sentences([problem.sentence(self.source) for problem in problems])

@@ -1,6 +1,7 @@
 """Tables a study declares: one cell a run, rows and columns by parameter, the paper's values beside them.
 
-Or, of many runs: the cheapest within an error (`cheapest`), how many there are (`count`), the share `solved`.
+Or, of many runs: the cheapest within an error (`cheapest`), how many there are (`count`), the share `solved`, who wins
+(`crossover`).
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ from nlsolve.audit import ACCEPTED
 from nlsolve.columns import RUNS
 from nlsolve.component import Component
 from nlsolve.condense import COUNT, NO_RUN, WITHIN, Cheapest, counted, key_of, success
+from nlsolve.crossover import Crossover
 from nlsolve.errors import ABSENT, Problem, StudyError, did_you_mean
 from nlsolve.outcomes import AT_A_SOLUTION, OUTCOME, SOLVED, outcome, solved
 from nlsolve.papers import PaperValues
@@ -59,6 +61,9 @@ class TableSpec(Component):
     cheapest: Cheapest | None = Field(
         None, description="keep the cheapest run within each error only, of each of the rows and columns"
     )
+    crossover: Crossover | None = Field(
+        None, description="which strategy is cheapest by the ratio of factorisation to triangular solve"
+    )
     count: bool = Field(
         False, description="cells count runs, such as rows = variant, columns = outcome; value = solved: those solved"
     )
@@ -79,6 +84,11 @@ class TableSpec(Component):
         if self.count and (self.cheapest is not None or not set(self.value) <= {COUNT, SOLVED}):
             drop = "cheapest" if self.cheapest is not None else "value, or show runs or solved"
             raise ValueError(f"count = true shows numbers of runs; drop {drop}")
+        if self.crossover is not None:
+            given = [name for name in ("rows", "columns", "value", "cheapest", "count", "paper") if getattr(self, name)]
+            if given:
+                raise ValueError(f"a crossover lays itself out; drop {given[0]}")
+            return self
         if not (self.count or self.value):
             raise ValueError("value is required, and missing: columns to show, or count = true")
         if not self.rows and self.cheapest is None:
@@ -104,11 +114,15 @@ class TableSpec(Component):
     @property
     def shown(self) -> Names:
         """Columns whose values are in the cells."""
+        if self.crossover is not None:
+            return self.crossover.shown
         return self.value or (COUNT,)
 
     @property
     def labels(self) -> Names:
         """Columns whose values tell the rows apart."""
+        if self.crossover is not None:
+            return self.crossover.labels
         return self.rows if self.cheapest is None else (WITHIN, *self.rows)
 
     def condensed(self, runs: Sequence[Mapping[str, Any]]) -> Sequence[Mapping[str, Any]]:
@@ -118,6 +132,8 @@ class TableSpec(Component):
             return self.cheapest.of(runs, layout)
         if self.success:
             return success(runs, layout, self.interval, self.format or SHARE)
+        if self.crossover is not None:
+            return self.crossover.of(runs)
         return counted(runs, layout) if self.count else runs
 
     def text(self, value: Any) -> str:
@@ -226,6 +242,7 @@ def check(spec: TableSpec, runs: Sequence[Mapping[str, Any]], measured: Iterable
     """
     known = list(dict.fromkeys([*measured, *(name for run in runs for name in run)]))
     contest = () if spec.cheapest is None else (spec.cheapest.cost, spec.cheapest.error)
+    axes = {} if spec.crossover is None else spec.crossover.columns_of_runs()
     problems = [
         Problem(place, name, f"no such column of the results; {did_you_mean(name, known)}")
         for place, names in [
@@ -235,6 +252,7 @@ def check(spec: TableSpec, runs: Sequence[Mapping[str, Any]], measured: Iterable
             (("where",), spec.where),
             (("cheapest", "cost"), contest[:1]),
             (("cheapest", "error"), contest[1:]),
+            *((("crossover", field), columns) for field, columns in axes.items()),
         ]
         for name in names
         if name not in known
@@ -247,7 +265,7 @@ def check(spec: TableSpec, runs: Sequence[Mapping[str, Any]], measured: Iterable
     if not chosen:
         asked = ", ".join(f"{name} = {value!r}" for name, value in spec.where.items())
         return [Problem(("where",), ABSENT, f"no case has these values: {asked}")]
-    if spec.success or spec.cheapest is not None:
+    if spec.success or spec.cheapest is not None or spec.crossover is not None:
         return []
     cells: dict[tuple[Any, ...], Mapping[str, Any]] = {}
     for run in () if spec.count else chosen:

@@ -62,7 +62,7 @@ class Box(Scene):
     def boundary_position(self, cloud: Cloud, time: float) -> Any:
         return cloud.nodes[cloud.boundary]
 
-    def boundary_velocity(self, cloud: Cloud, time: float) -> Any:
+    def boundary_velocity(self, cloud: Cloud, law: ConstitutiveLaw, time: float) -> Any:
         return np.zeros((len(cloud.boundary), 2))
 
 
@@ -221,7 +221,9 @@ def write_study(folder: Path, *changes: tuple[str, str], text: str = STUDY) -> P
     return path
 
 
-def fake_march(setup: Setup, listen: Callable[[Progress], None] | None = None) -> Record:
+def fake_march(
+    setup: Setup, listen: Callable[[Progress], None] | None = None, clock: Callable[[], float] | None = None
+) -> Record:
     """A record whose numbers follow from the solver's parameters."""
     order, tolerance = getattr(setup.solver, "order", 1), getattr(setup.solver, "tolerance", 1.0)
     if listen is not None:

@@ -71,7 +71,7 @@ def test_run_without_tables_lists_endings(tmp_path):
 
 
 def test_divergence_is_a_result(tmp_path, monkeypatch):
-    def march(setup, listen):
+    def march(setup, listen, clock):
         record = fake_march(setup, listen)
         record.summary["status"] = "diverged"
         return record
@@ -84,7 +84,7 @@ def test_divergence_is_a_result(tmp_path, monkeypatch):
 
 
 def test_a_crash_is_1(tmp_path, monkeypatch):
-    def march(setup, listen):
+    def march(setup, listen, clock):
         raise RuntimeError("[oops]")
 
     monkeypatch.setattr("nlsolve.runner.march", march)
@@ -96,7 +96,7 @@ def test_a_crash_is_1(tmp_path, monkeypatch):
 def test_an_interruption_is_130_and_keeps_what_is_finished(tmp_path, monkeypatch):
     count = 0
 
-    def march(setup, listen):
+    def march(setup, listen, clock):
         nonlocal count
         count += 1
         if count == 2:
@@ -165,12 +165,16 @@ def test_plan(tmp_path):
     result = nlsolve("plan", path)
     assert result.exit_code == 0
     assert "4 cases" in result.stdout
-    assert "forecast: one factorisation and 20 pairs of triangular solves an increment" in result.stdout
+    assert "then one factorisation and 20 pairs of triangular solves an increment" in result.stdout
     cases = json.loads(nlsolve("plan", path, "--set", "scene.horizon=1e-3", "--json").stdout)["cases"]
     assert [(row["increments"], row["nodes"], row["unknowns"]) for row in cases] == [(10, 4, 2)] * 4
-    assert cases[0]["seconds"] == pytest.approx(
-        10 * (cases[0]["seconds_factorization"] + 20 * cases[0]["seconds_triangular_solve"])
-        + cases[0]["seconds_operators"]
+    first = cases[0]
+    assert first["seconds_increment"] > first["seconds_factorization"] + 20 * first["seconds_triangular_solve"]
+    assert first["seconds_iteration"] > first["seconds_factorization"] + first["seconds_triangular_solve"]
+    assert first["seconds"] == pytest.approx(10 * first["seconds_increment"])
+    assert first["seconds_start"] == pytest.approx(2 * 5 * first["seconds_iteration"])  # n = 1 and the target
+    assert first["seconds_all"] == pytest.approx(
+        first["seconds_start"] + first["seconds"] + first["seconds_operators"]  # fixed nodes have one cloud
     )
 
 

@@ -183,7 +183,9 @@ def test_a_series_of_order_p_costs_one_residual_p_minus_one_orders_and_p_solves(
     assert outcome.status is Status.CONVERGED
     expected = {
         "residual": k,
+        "expansion": k,
         "series_order": k * (p - 1),
+        "series_term": k * p * (p - 1) // 2,
         "jacobian": 1,
         "factorization": 1,
         "triangular_solve": k * p,
@@ -199,6 +201,7 @@ def test_orders_that_are_skipped_over_are_counted_all_the_same() -> None:
         expansion.append(0.1 * START)
     expansion.coefficient(5)
     assert ledger.counts["series_order"] == 5
+    assert ledger.counts["series_term"] == 1 + 2 + 3 + 4 + 5
     assert ledger.counts["residual"] == 1
 
 
@@ -209,7 +212,7 @@ def test_an_order_asked_for_twice_is_computed_and_counted_once() -> None:
     for _ in range(3):
         expansion.coefficient(0)
         expansion.coefficient(1)
-    assert counts(ledger) == {"residual": 1, "series_order": 1}
+    assert counts(ledger) == {"residual": 1, "expansion": 1, "series_order": 1, "series_term": 1}
 
 
 def test_refinement_is_counted() -> None:

@@ -29,7 +29,7 @@ def marched(monkeypatch) -> list:
     """The setups that were marched; the march itself is replaced."""
     setups: list = []
 
-    def march(setup, listen):
+    def march(setup, listen, clock):
         setups.append(setup)
         return fake_march(setup, listen)
 
@@ -41,7 +41,7 @@ def failing_on(monkeypatch, number: int, error: BaseException) -> None:
     """The march of one case, by number from 1, raises."""
     count = 0
 
-    def march(setup, listen):
+    def march(setup, listen, clock):
         nonlocal count
         count += 1
         if count == number:
@@ -157,7 +157,7 @@ def test_events(study, tmp_path):
 def test_a_case_has_one_thread(study, monkeypatch):
     seen = []
 
-    def march(setup, listen):
+    def march(setup, listen, clock):
         seen.extend(pool["num_threads"] for pool in threadpool_info())
         return fake_march(setup, listen)
 

@@ -1,5 +1,5 @@
-"""Figures a study declares, for print: curves, maps, trades and solved problems of runs, curves of steps, clouds,
-profiles and fields.
+"""Figures a study declares, for print: curves, maps, trades, crossovers and solved problems of runs, curves of steps,
+clouds, profiles and fields.
 
 A figure is a validated value like everything else in a study; `draw` turns it and the result frames into a
 `matplotlib.figure.Figure` without touching pyplot, `save` writes it as PNG and PDF, the same bytes every time.
@@ -17,6 +17,7 @@ from pydantic import Field
 
 from nlsolve.figures.base import BaseFigure, FigureError, Frames
 from nlsolve.figures.cloud import CloudFigure
+from nlsolve.figures.crossover import CrossoverFigure
 from nlsolve.figures.field import FieldFigure
 from nlsolve.figures.line import LineFigure
 from nlsolve.figures.map import MapFigure
@@ -28,6 +29,7 @@ from nlsolve.figures.trade import TradeFigure
 __all__ = [
     "BaseFigure",
     "CloudFigure",
+    "CrossoverFigure",
     "DataFigure",
     "FieldFigure",
     "FigureError",
@@ -43,7 +45,15 @@ __all__ = [
 ]
 
 FigureSpec = Annotated[
-    LineFigure | MapFigure | TradeFigure | PerformanceFigure | DataFigure | CloudFigure | ProfileFigure | FieldFigure,
+    LineFigure
+    | MapFigure
+    | TradeFigure
+    | CrossoverFigure
+    | PerformanceFigure
+    | DataFigure
+    | CloudFigure
+    | ProfileFigure
+    | FieldFigure,
     Field(discriminator="kind"),
 ]
 """What a study's `[[figure]]` may be."""
