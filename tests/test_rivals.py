@@ -119,6 +119,15 @@ def test_anderson_on_a_linear_problem_is_gmres(k: int) -> None:
     np.testing.assert_allclose(states[-1], expected, atol=1e-7 * np.linalg.norm(expected - start))
 
 
+def test_anderson_may_be_deeper_than_there_are_unknowns() -> None:
+    """As many differences as unknowns span all there is: f = −0.4 A u ends at 0 in three more steps than unknowns."""
+    matrix, u = np.array([[2.0, 0.3], [0.1, 0.5]]), np.array([3.0, -2.0])
+    mixing = Mixing(5, 1.0)
+    for _ in range(5):
+        u = mixing.next(u, -0.4 * (matrix @ u))
+    assert np.linalg.norm(u) < 1e-12
+
+
 def test_without_depth_anderson_is_modified_newton() -> None:
     flow = spin_flow(0.5)
     np.testing.assert_array_equal(

@@ -6,7 +6,6 @@ Anderson (1965); Walker & Ni (2011), whose rule for an ill-conditioned ΔF is to
 from __future__ import annotations
 
 import numpy as np
-import scipy.linalg
 
 WORST_CONDITION = 1e8  # of R in ΔF = Q R: beyond it γ amplifies the rounding in f
 
@@ -35,11 +34,12 @@ class Mixing:
             self._changes = [*self._changes, f - self._last[1]][-most:]
         self._last = u, f
         plain = u + self._damping * f
-        while self._changes:
-            changes = np.stack(self._changes, axis=1)
-            q, r = np.linalg.qr(changes)
-            if np.linalg.cond(r) <= WORST_CONDITION:
-                gamma = scipy.linalg.solve_triangular(r, q.T @ f)
-                return plain - (np.stack(self._states, axis=1) + self._damping * changes) @ gamma
+        while m := len(self._changes):
+            rows = np.array([*self._changes, f])
+            r: np.ndarray = np.asarray(np.linalg.qr(rows.T, mode="r"))  # of (ΔF f): beside the R of ΔF stands Qᵀ f
+            left, sizes, right = np.linalg.svd(r[:m, :m])
+            if sizes[0] <= WORST_CONDITION * sizes[-1]:
+                gamma = (r[:m, m] @ left / sizes) @ right
+                return plain - gamma @ np.array(self._states) - self._damping * (gamma @ rows[:m])
             del self._states[0], self._changes[0]
         return plain

@@ -37,24 +37,40 @@ def gmres(product: Map, precondition: Map, b: np.ndarray, tolerance: float, most
     size = left = float(np.linalg.norm(b))
     basis, directions = np.empty((most + 1, len(b))), np.empty((most, len(b)))
     basis[0] = b / size
-    hessenberg = np.zeros((most + 1, most))
-    y: np.ndarray = np.zeros(0)
+    triangle, rotated = np.zeros((most, most)), [size]  # R of the Hessenberg matrix, and Qᵀ e_1 ‖b‖
+    rotations: list[tuple[float, float]] = []
     for k in range(most):
         directions[k] = precondition(basis[k])
         w: np.ndarray = product(directions[k])
         length = float(np.linalg.norm(w))
         if not np.isfinite(length):
             raise SolveError(Status.NON_FINITE, "a product with the Jacobian was not finite")
+        column = np.zeros(k + 1)
         for _ in range(2):  # Gram and Schmidt twice are enough (Kahan)
             projections = basis[: k + 1] @ w
             w = w - projections @ basis[: k + 1]
-            hessenberg[: k + 1, k] += projections
-        hessenberg[k + 1, k] = np.linalg.norm(w)
-        e_1 = np.zeros(k + 2)
-        e_1[0] = size
-        y = np.asarray(np.linalg.lstsq(hessenberg[: k + 2, : k + 1], e_1, rcond=None)[0])
-        left = float(np.linalg.norm(e_1 - hessenberg[: k + 2, : k + 1] @ y))
-        if left <= tolerance or hessenberg[k + 1, k] <= np.finfo(float).eps * length:
+            column += projections
+        beyond = float(np.linalg.norm(w))
+        triangle[: k + 1, k], rotation = rotated_column([*column.tolist(), beyond], rotations)
+        rotations.append(rotation)
+        cosine, sine = rotation
+        rotated[k:] = [cosine * rotated[k], -sine * rotated[k]]
+        left = abs(rotated[k + 1])
+        if left <= tolerance or beyond <= np.finfo(float).eps * length:
             break
-        basis[k + 1] = w / hessenberg[k + 1, k]
-    return Krylov(y @ directions[: len(y)], left, len(y))
+        basis[k + 1] = w / beyond
+    count = len(rotations)
+    y = np.linalg.lstsq(triangle[:count, :count], np.array(rotated[:count]), rcond=None)[0]
+    return Krylov(y @ directions[:count], left, count)
+
+
+def rotated_column(
+    column: list[float], rotations: list[tuple[float, float]]
+) -> tuple[list[float], tuple[float, float]]:
+    """A new column of the Hessenberg matrix after the rotations before it (Givens), and the one that clears its end."""
+    for i, (cosine, sine) in enumerate(rotations):
+        upper, lower = column[i], column[i + 1]
+        column[i], column[i + 1] = cosine * upper + sine * lower, cosine * lower - sine * upper
+    norm = float(np.hypot(column[-2], column[-1]))
+    rotation = (column[-2] / norm, column[-1] / norm) if norm else (1.0, 0.0)
+    return [*column[:-2], norm], rotation
