@@ -124,6 +124,7 @@ STEPS: dict[str, str] = {
     "residual_norm": "relative residual at the step",
     "difference": "relative difference from the step before, in the norm of the stopping test",
     "range": "a_max of the last series computed for the step",
+    "singularity": "distance of the nearest singularity of the last series, as a part of its path, from its last terms",
     "limited_by": "what limited that range: end of path, the range rule, pole (of a Padé), order (the highest) or cost "
     "(a new branch is cheaper than more orders)",
     "length": "step length of the line search, or the part of the path a series advanced",

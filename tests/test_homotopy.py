@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import scipy.sparse as sp
 from cases import near, run, spin_flow
 from nlsolve_homotopy import AsymptoticNumericalMethod
 from nlsolve_homotopy.branch import Branch
@@ -18,7 +19,7 @@ from nlsolve_refresh import EveryIteration, Never, RangeUnderOne
 from pydantic import ValidationError
 
 import nlsolve
-from nlsolve import NonlinearProblem, Status
+from nlsolve import Expansion, NonlinearProblem, Series, Status
 from nlsolve.driver import StoppingTest
 from nlsolve.series import Array
 from nlsolve.small import DenseLU, SmallProblem
@@ -41,6 +42,52 @@ def branch(problem: NonlinearProblem, start: Array, matrix: Any, order: int, for
         rhs = made.recurrence.right_hand_side()
         made.append(rhs, inverse @ rhs)
     return made
+
+
+# The nearest singularity.
+
+
+class SquareRoot(NonlinearProblem):
+    """R(u) = u² − (1 + c): along G(W) = (1 − a) G(0) from u = 1, u(a) = √(1 + c a), singular at a = −1/c."""
+
+    def __init__(self, c: float) -> None:
+        self.c = c
+
+    def residual(self, u: Any) -> Any:
+        return u * u - (1.0 + self.c)
+
+    def jacobian(self, u: Array) -> Any:
+        return sp.csr_array(np.diag(2.0 * u))
+
+    def expand(self, u: Array) -> Expansion:
+        path = Series(u)
+        return Expansion(path, self.residual(path))
+
+
+@pytest.mark.parametrize("c", [0.5, 1.0, 4.0, -0.8])
+def test_the_last_terms_tell_the_nearest_singularity(c: float) -> None:
+    problem, start = SquareRoot(c), np.ones(1)
+    made = branch(problem, start, problem.jacobian(start), 40, NEWTON)
+    assert made.singularity == pytest.approx(1.0 / abs(c), rel=0.05)
+    assert np.isnan(branch(problem, start, problem.jacobian(start), 2, NEWTON).singularity)
+
+
+def test_a_linear_problem_has_no_singularity() -> None:
+    outcome, _ = run(LinearProblem(), Method(), RangeUnderOne(), np.zeros(3), DenseLU())
+    assert outcome.steps[-1]["singularity"] == np.inf
+
+
+class LinearProblem(SquareRoot):
+    """R(u) = 2 u − 1, solved by the first term."""
+
+    def __init__(self) -> None:
+        super().__init__(0.0)
+
+    def residual(self, u: Any) -> Any:
+        return 2.0 * u - 1.0
+
+    def jacobian(self, u: Array) -> Any:
+        return sp.csr_array(2.0 * np.eye(len(u)))
 
 
 # The defaults are the method there was before it had choices.

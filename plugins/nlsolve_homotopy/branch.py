@@ -36,6 +36,15 @@ class Branch:
         first = self.residual
         return float((np.linalg.norm(self.rhs[-1]) / first) ** (1.0 / (self.order - 1))) if first else 0.0
 
+    @property
+    def singularity(self) -> float:
+        """ρ ≈ (‖W_{p−2}‖/‖W_p‖)^(1/2): how far from a = 0 the nearest singularity of W lies. Over two orders, because
+        the terms of an even or an odd W vanish in turn (Hadamard; of two singularities ±ρ or ρ e^(±iθ) the common ρ).
+        """
+        if self.order < 3 or not self.sizes[-1]:
+            return float("inf") if self.order and not self.sizes[-1] else float("nan")
+        return float((self.sizes[-3] / self.sizes[-1]) ** 0.5)
+
     def append(self, rhs: np.ndarray, w_j: np.ndarray) -> None:
         """Push W_j and r_j = K* W_j."""
         self.rhs.append(rhs)

@@ -83,9 +83,17 @@ class AsymptoticNumericalMethod(NonlinearSolver):
                 branch, reach, limit = self._branch(problem, tangent, state, goal)
             length = min(1.0, reach)
             if not length > SHORTEST_RANGE:
-                raise SolveError(Status.RANGE_EXHAUSTED, f"a_max = {reach:.1e} for a series of order {branch.order}")
-            notes: dict[str, float | str]
-            notes = {"range": reach, "length": length, "limited_by": limit, "contraction": branch.contraction}
+                nearest = f"its nearest singularity is about {branch.singularity:.1e} of the path away"
+                raise SolveError(
+                    Status.RANGE_EXHAUSTED, f"a_max = {reach:.1e} for a series of order {branch.order}; {nearest}"
+                )
+            notes: dict[str, float | str] = {
+                "range": reach,
+                "length": length,
+                "limited_by": limit,
+                "singularity": branch.singularity,
+                "contraction": branch.contraction,
+            }
             state = state + branch.increment(length)
             yield Step(state, claim=length == 1.0, notes=notes)
             for _ in range(self.corrections if length == 1.0 else 0):
