@@ -13,6 +13,7 @@ import pandas as pd
 from threadpoolctl import threadpool_limits
 
 from nlsolve.algebra import solve_system
+from nlsolve.composition import Case
 from nlsolve.costs import CLOCKS, Timing, measure
 from nlsolve.errors import StudyError, did_you_mean
 from nlsolve.figures import FigureError, Frames, draw, save
@@ -24,7 +25,7 @@ from nlsolve.references import with_reference_errors
 from nlsolve.report import write_report
 from nlsolve.status import SolveError, Status
 from nlsolve.store import Part, Store, merge
-from nlsolve.studies import Case, Study
+from nlsolve.studies import Study
 from nlsolve.tables import Table, build
 
 
