@@ -14,9 +14,9 @@ from nlsolve.algebra import AlgebraicSetup
 from nlsolve.component import Component
 from nlsolve.driver import Budget, StoppingTest
 from nlsolve.errors import ABSENT, Problem, problems_in
-from nlsolve.march import Setup
 from nlsolve.outcomes import names_settings
 from nlsolve.registry import CONTRACTS, Registry
+from nlsolve.setup import Setup
 from nlsolve.start import LOAD, Start
 from nlsolve.sweeps import Document, Point, leaves
 from nlsolve.systems import System
