@@ -15,9 +15,9 @@ from nlsolve.compression import Compression
 from nlsolve.driver import Budget, Outcome, StoppingTest, solve
 from nlsolve.ledger import Ledger
 from nlsolve.linear import LinearSolver
-from nlsolve.march import Progress, Record, reported
 from nlsolve.problems import Expansion, NonlinearProblem
 from nlsolve.series import Array, Series
+from nlsolve.setup import Progress, Record, reported
 from nlsolve.solvers import NonlinearSolver, RefreshRule
 from nlsolve.status import SolveError, Status
 from nlsolve.systems import System

@@ -21,11 +21,12 @@ from pydantic import Field
 from threadpoolctl import threadpool_limits
 
 from nlsolve.algebra import Algebraic, AlgebraicSetup
+from nlsolve.balance import sample
 from nlsolve.component import Component
 from nlsolve.linear import LinearSolver
-from nlsolve.march import Setup, sample
 from nlsolve.problems import Expansion, NonlinearProblem
 from nlsolve.series import Array
+from nlsolve.setup import Setup
 
 PREFIX = "unit."
 """Before the name of a unit cost in `runs`."""
@@ -133,7 +134,7 @@ class Calibration:
 
 
 def calibrate(setup: Setup | AlgebraicSetup, rounds: int = ROUNDS) -> Calibration:
-    """On the cloud a case begins with (see `march.sample`), or at the start of a system. Raises SolveError where the
+    """On the cloud a case begins with (see `balance.sample`), or at the start of a system. Raises SolveError where the
     cloud or the first tangent is bad.
     """
     with threadpool_limits(limits=1):

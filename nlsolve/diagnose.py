@@ -8,8 +8,8 @@ from typing import Any
 import pandas as pd
 
 from nlsolve.columns import DIAGNOSTICS
-from nlsolve.march import Setup
 from nlsolve.outcomes import names_settings
+from nlsolve.setup import Setup
 from nlsolve.status import SolveError
 from nlsolve.studies import Study
 

@@ -10,7 +10,7 @@ import pandas as pd
 from nlsolve.algebra import AlgebraicSetup
 from nlsolve.component import Component
 from nlsolve.costs import calibrate
-from nlsolve.march import Setup
+from nlsolve.setup import Setup
 from nlsolve.status import SolveError
 from nlsolve.studies import Study
 

@@ -13,18 +13,20 @@ import pandas as pd
 from threadpoolctl import threadpool_limits
 
 from nlsolve.algebra import solve_system
+from nlsolve.composition import Case
 from nlsolve.costs import CLOCKS, Timing, measure
 from nlsolve.errors import StudyError, did_you_mean
 from nlsolve.figures import FigureError, Frames, draw, save
 from nlsolve.linear import LinearSolver
-from nlsolve.march import Progress, Record, Setup, march
+from nlsolve.march import march
 from nlsolve.outcomes import number
 from nlsolve.predictions import UNITS, with_predictions
 from nlsolve.references import with_reference_errors
 from nlsolve.report import write_report
+from nlsolve.setup import Progress, Record, Setup
 from nlsolve.status import SolveError, Status
 from nlsolve.store import Part, Store, merge
-from nlsolve.studies import Case, Study
+from nlsolve.studies import Study
 from nlsolve.tables import Table, build
 
 

@@ -2,51 +2,27 @@
 
 from __future__ import annotations
 
-import hashlib
 import itertools
-import json
 import re
 import tomllib
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, create_model
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from nlsolve.algebra import AlgebraicSetup
 from nlsolve.columns import RUNS
-from nlsolve.component import Component
+from nlsolve.composition import SECTIONS, Case, Composer, Invalid
 from nlsolve.costs import Timing
-from nlsolve.driver import Budget, StoppingTest
 from nlsolve.errors import ABSENT, Problem, Source, StudyError, did_you_mean, problems_in
 from nlsolve.figures import FigureSpec
 from nlsolve.locate import Place, lines_of
-from nlsolve.march import Setup
 from nlsolve.outcomes import VARIANT, names_settings
 from nlsolve.references import REFERENCE
-from nlsolve.registry import CONTRACTS, Registry, load_registry
-from nlsolve.start import LOAD, Start
+from nlsolve.registry import Registry, load_registry
 from nlsolve.sweeps import Document, Point, Setting, Sweep, assign_all, leaves, merged, places_of, swept_places
-from nlsolve.systems import System
 from nlsolve.tables import TableSpec, check
-
-SECTIONS = tuple(part.name for part in fields(Setup))
-"""The parts of a study that a case is made of, and that can be swept."""
-
-DEFAULT_KINDS = {"linear": {"kind": "superlu"}, "starter": {"kind": "newton"}, "predictor": {"kind": "previous"}}
-"""Sections that may be left out, or written without a kind."""
-
-DEFAULTS_OF_KINDS = {"solver": "refresh", "discretizer": "counterpart"}
-"""Sections whose default the kind of another one names, as `default_refresh` and `default_counterpart`."""
-
-OF_A_SYSTEM = tuple(field.name for field in fields(AlgebraicSetup))
-"""Those of them that a scene without a flow has: F(u) = 0 knows no law, no discretizer, no way to a first state."""
-
-DEFAULT_KINDS_OF_A_SYSTEM = {"linear": {"kind": "superlu"}, "solver": {"kind": "robust"}}
-"""The same where the scene is a system of equations: it may be solved without a choice of the method."""
-
-DIGEST_LETTERS = 12
 
 
 class Frame(BaseModel):
@@ -63,31 +39,6 @@ class Frame(BaseModel):
     figure: tuple[FigureSpec, ...] = ()
     timing: Timing = Timing()
     quick: dict[str, Any] = Field(default_factory=dict, description="what --quick changes")
-
-
-@dataclass(frozen=True)
-class Case:
-    """One setup to be run.
-
-    id : digest of the validated components.
-    parameters : every parameter under its dotted name ("solver.order"); lists as JSON text. Before them, where a sweep
-        has named settings, `variant` or what the sweep calls them: the names of this case's.
-    swept : the names among them that the study sweeps and that differ between its cases; `variant` stands for all that
-        its settings assign.
-    reference : id of the case whose velocities are held to be right; empty without one.
-    """
-
-    id: str
-    setup: Setup | AlgebraicSetup
-    parameters: Mapping[str, Any]
-    swept: tuple[str, ...]
-    reference: str = ""
-
-    @property
-    def label(self) -> str:
-        """The swept parameters, for people."""
-        words = [f"{'' if names_settings(name) else f'{name} = '}{self.parameters[name]}" for name in self.swept]
-        return ", ".join(words) or "the only case"
 
 
 @dataclass(frozen=True)
@@ -142,7 +93,7 @@ class _Builder:
     def __init__(
         self, source: Source, document: Mapping[str, Any], overrides: Mapping[str, Any], quick: bool, registry: Registry
     ) -> None:
-        self.registry = registry
+        self.composer = Composer(registry)
         self.document: Document = merged({}, document)
         aliases = {name: source.at(place) for name, place in swept_places(self.document).items()}
         quick_values: Document = {}
@@ -156,20 +107,6 @@ class _Builder:
         self.overrides = {**quick_values, **overrides}
         self.source = Source(source.file, source.lines, aliases | {name: f"{source.file}, --set" for name in overrides})
         self.refuse(assign_all(self.document, self.overrides))
-        parts: dict[str, Any] = {noun: (registry.union(noun), ...) for noun in CONTRACTS if noun in SECTIONS} | {
-            "refresh": (registry.union("refresh"), None),  # absent only when there is no solver to ask for its default
-            "starter": (registry.union("solver"), ...),
-            "counterpart": (registry.union("discretizer"), None),
-            "stop": (StoppingTest, StoppingTest()),
-            "start": (Start, Start()),
-            "budget": (Budget, Budget()),
-            "record": (tuple[Annotated[float, Field(ge=0, allow_inf_nan=False)], ...], ()),
-        }
-        config = ConfigDict(extra="forbid", frozen=True)
-        self.model = create_model("Composition", __config__=config, **parts)
-        self.model_of_a_system = create_model(
-            "SystemComposition", __config__=config, **{name: parts[name] for name in OF_A_SYSTEM}
-        )
 
     def study(self, name: str) -> Study:
         frame = self.frame()
@@ -279,8 +216,8 @@ class _Builder:
         if wrong:
             raise _Refused([problem.sentence(source) for problem in wrong])
         try:
-            return self.case(document, points)
-        except _Invalid as invalid:
+            return self.composer.case(document, points)
+        except Invalid as invalid:
             raise _Refused([problem.sentence(source) for problem in invalid.problems]) from invalid
 
     def reference(
@@ -313,88 +250,6 @@ class _Builder:
         known = {name: where for name, where in self.source.aliases.items() if name in hand or name not in named}
         mine = {name: place for point in points for name, place in point.places.items() if name not in hand}
         return replace(self.source, aliases=known | {name: self.source.at(place) for name, place in mine.items()})
-
-    def case(self, document: Document, points: tuple[Point, ...]) -> Case:
-        """Validate one combination. Raises _Invalid."""
-        of_a_system = issubclass(self.named(document, "scene"), System)
-        sections, model = (OF_A_SYSTEM, self.model_of_a_system) if of_a_system else (SECTIONS, self.model)
-        needless = [name for name in document if name not in sections]
-        if needless:
-            sentence = "a scene that is a system of equations has no such section: leave it out"
-            raise _Invalid([Problem((name,), ABSENT, sentence) for name in needless])
-        for section, default in (DEFAULT_KINDS_OF_A_SYSTEM if of_a_system else DEFAULT_KINDS).items():
-            self.complete(document, section, default)
-        for noun, section in DEFAULTS_OF_KINDS.items():
-            if section not in sections:
-                continue
-            of_its_kind = getattr(self.named(document, noun), f"default_{section}", None)
-            if of_its_kind is not None:
-                self.complete(document, section, of_its_kind)
-        try:
-            composition = model.model_validate(document)
-        except ValidationError as error:
-            raise _Invalid(problems_in(error, model, document)) from error
-        chosen = {name: getattr(composition, name) for name in sections}
-        setup = AlgebraicSetup(**chosen) if of_a_system else Setup(**chosen)
-        if setup.stop.kind == "claim" and not setup.solver.claims:
-            sentence = f"the solver {setup.solver.kind_name()!r} never claims a solution; use residual or difference"
-            raise _Invalid([Problem(("stop", "kind"), "claim", sentence)])
-        if isinstance(setup, Setup):
-            self.check_continuation(setup)
-        plain = json.loads(composition.model_dump_json())
-        canonical = json.dumps(plain, sort_keys=True, separators=(",", ":"))
-        digest = hashlib.sha256(canonical.encode()).hexdigest()[:DIGEST_LETTERS]
-        parameters = {
-            name: json.dumps(value) if isinstance(value, list | dict) else value for name, value in leaves(plain)
-        }
-        swept = [name for point in points if not point.name for name in point.values]
-        names = tuple(
-            parameter
-            for parameter in parameters
-            if any(parameter == name or parameter.startswith(f"{name}.") for name in swept)
-        )
-        named: dict[str, str] = {}
-        for point in points:
-            if point.name:
-                named[point.column] = ", ".join(filter(None, (named.get(point.column), point.name)))
-        parameters, names = {**named, **parameters}, (*named, *names)
-        return Case(digest, setup, parameters, names)
-
-    def check_continuation(self, setup: Setup) -> None:
-        """Refuse a way to the first state that the law cannot go."""
-        try:
-            setup.start.stages(setup.law)
-        except ValidationError as error:
-            reasons = "; ".join(detail["msg"] for detail in error.errors())
-            raise _Invalid(
-                [Problem(("start", "values"), list(setup.start.values), f"refused by the law: {reasons}")]
-            ) from error
-        except ValueError as error:
-            field = "values" if setup.start.by == LOAD else "by"
-            reason = str(error).partition(": ")[2]
-            raise _Invalid([Problem(("start", field), getattr(setup.start, field), reason)]) from error
-
-    def named(self, document: Document, section: str) -> type[Component]:
-        """The installed class that a section names, or is; Component itself where there is none."""
-        given = document.get(section)
-        if isinstance(given, Component):
-            return type(given)
-        kind = given.get("kind") if isinstance(given, dict) else None
-        return self.registry.classes(section).get(kind, Component) if isinstance(kind, str) else Component
-
-    def complete(self, document: Document, section: str, default: Mapping[str, Any]) -> None:
-        """Give a section that names no kind its default."""
-        given = document.get(section, {})
-        if isinstance(given, dict) and "kind" not in given:
-            document[section] = {**default, **given}
-
-
-class _Invalid(Exception):
-    """What is wrong with a document that does not make a case."""
-
-    def __init__(self, problems: list[Problem]) -> None:
-        super().__init__()
-        self.problems = problems
 
 
 class _Refused(Exception):

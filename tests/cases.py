@@ -17,8 +17,8 @@ from nlsolve import NonlinearProblem, NonlinearSolver, RefreshRule, Scene
 from nlsolve.driver import Budget, Outcome, StoppingTest, solve
 from nlsolve.flow import Flow
 from nlsolve.ledger import Ledger
-from nlsolve.march import Setup
 from nlsolve.series import Array
+from nlsolve.setup import Setup
 from nlsolve.tangent import Tangent
 
 PLAIN = SuperLU(ordering="mmd-ata")  # no trials of orderings in the counts

@@ -27,8 +27,8 @@ from nlsolve import (
     Step,
     hookimpl,
 )
-from nlsolve.march import Progress, Record, Setup
 from nlsolve.registry import Registry
+from nlsolve.setup import Progress, Record, Setup
 
 
 class Even(Component):

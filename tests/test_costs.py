@@ -22,6 +22,7 @@ from pydantic import TypeAdapter, ValidationError
 
 import nlsolve
 from nlsolve import Factors, LinearSolver, NonlinearProblem, SolveError, Status
+from nlsolve.balance import sample
 from nlsolve.columns import RUNS
 from nlsolve.costs import COUNTS, ORDER, UnitCosts, calibrate, measure
 from nlsolve.crossover import OTHER, SAME, TIE, Crossover
@@ -29,10 +30,11 @@ from nlsolve.envelope import at_best, envelope, under, wins
 from nlsolve.errors import StudyError
 from nlsolve.figures import BaseFigure, FigureError, FigureSpec, draw
 from nlsolve.figures.style import ACCENT
-from nlsolve.march import Record, march, sample
+from nlsolve.march import march
 from nlsolve.plan import forecast
 from nlsolve.predictions import UNITS, with_predictions
 from nlsolve.runner import run as run_study
+from nlsolve.setup import Record
 from nlsolve.small import SmallProblem
 from nlsolve.studies import Study
 from nlsolve.tables import TableSpec, build

@@ -18,10 +18,10 @@ PLUGINS = HOUSE.parent / "plugins"
 FLOORS = [
     "series component status columns",
     "laws scenes systems discretizers linear problems assembled predictors globalization solvers",
-    "flow algebra compression tangent pressure motion start march measures estimate audit ledger driver",
+    "flow algebra compression tangent pressure motion start setup balance march measures estimate audit ledger driver",
     "hookspecs registry nested",
-    "studies locate errors outcomes shares condense sweeps references runner store tables papers report plan diagnose "
-    "figures costs predictions envelope crossover",
+    "studies composition locate errors outcomes shares condense sweeps references runner store tables papers report "
+    "plan diagnose figures costs predictions envelope crossover",
     "testing small cli progress __init__",
 ]
 FLOOR = {name: number for number, names in enumerate(FLOORS) for name in names.split()}

@@ -26,7 +26,8 @@ from pydantic import ValidationError
 from nlsolve import Cloud, Operators, SolveError, Status, Step
 from nlsolve.columns import FIELDS, RUNS, STEPS
 from nlsolve.driver import Budget, StoppingTest
-from nlsolve.march import Progress, Record, march
+from nlsolve.march import march
+from nlsolve.setup import Progress, Record
 from nlsolve.start import Start
 
 COARSE = Rings(spacing=0.5)

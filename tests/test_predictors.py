@@ -17,7 +17,8 @@ from scipy.special import binom
 
 from nlsolve import Predictor
 from nlsolve.driver import StoppingTest
-from nlsolve.march import Record, march
+from nlsolve.march import march
+from nlsolve.setup import Record
 from nlsolve.testing import check_predictor
 
 PREDICTORS = (Previous(), Polynomial(), Polynomial(degree=4))

@@ -1,0 +1,34 @@
+"""Every contract ships its check: the conformance kit of nlsolve, for its own plugins and for strangers'.
+
+    def test_my_law() -> None:
+        check_law(MyLaw())
+
+A check takes an instance, runs it through what its contract promises, and raises AssertionError with a sentence that
+says which promise was broken and by how much. The numbers it draws are seeded: a check fails always or never.
+"""
+
+from __future__ import annotations
+
+from nlsolve.testing.discretizers import check_discretizer
+from nlsolve.testing.globalization import check_globalization
+from nlsolve.testing.laws import check_law
+from nlsolve.testing.linear import check_linear_solver
+from nlsolve.testing.predictors import check_predictor
+from nlsolve.testing.problems import check_problem
+from nlsolve.testing.refresh import check_refresh_rule
+from nlsolve.testing.scenes import check_scene
+from nlsolve.testing.solvers import check_solver
+from nlsolve.testing.systems import check_system
+
+__all__ = [
+    "check_discretizer",
+    "check_globalization",
+    "check_law",
+    "check_linear_solver",
+    "check_predictor",
+    "check_problem",
+    "check_refresh_rule",
+    "check_scene",
+    "check_solver",
+    "check_system",
+]

@@ -1,0 +1,35 @@
+"""R(u), J(u) and R_j : the check of nonlinear problems."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from nlsolve.problems import NonlinearProblem
+from nlsolve.series import Array, Series
+from nlsolve.testing.promises import ORDER, PARTS, check_coefficients, norm, require, same
+
+
+def check_problem(problem: NonlinearProblem, u: Array, tolerance: float = 1e-6) -> None:
+    """J d against central differences of R along random d, to `tolerance`; R_j along a path against R on that path."""
+    random = np.random.default_rng(0)
+    size = norm(u) / np.sqrt(len(u)) or 1.0
+    jacobian = problem.jacobian(u)
+    for _ in range(3):
+        d = random.standard_normal(len(u)) * size
+        product = jacobian @ d
+        steps = [(problem.residual(u + h * d) - problem.residual(u - h * d)) / (2.0 * h) for h in PARTS]
+        off = min(norm(product - difference) for difference in steps) / norm(product)
+        require(off <= tolerance, f"the Jacobian is off by {off:.1e} from central differences, allowed {tolerance:g}")
+    expansion = problem.expand(u)
+    path = Series(u)
+    for j in range(1, ORDER + 1):
+        path.append(random.standard_normal(len(u)) * size / 4.0**j)
+        remainder = expansion.remainder(j).copy()
+        expansion.append(path.coefficient(j))
+        product, found = jacobian @ path.coefficient(j), expansion.coefficient(j) - remainder
+        same(found, product, norm(product), f"R_{j} less its remainder against J u_{j}", 1e-9)
+    same(expansion.path(0.5), path.sum(0.5), size, "path(a) against the sum of what was appended", 1e-12)
+    coefficients = [expansion.coefficient(j) for j in range(ORDER + 1)]
+    start = problem.residual(u)
+    same(coefficients[0], start, norm(start) or problem.scale(u), "R_0 against R(u)", 1e-12)
+    check_coefficients(lambda a: problem.residual(path.sum(a)), coefficients, "residual along a path")

@@ -1,0 +1,46 @@
+"""u_0, u_1, … → u* : the check of nonlinear solvers."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from nlsolve.driver import Budget, StoppingTest, solve
+from nlsolve.ledger import Ledger
+from nlsolve.problems import NonlinearProblem
+from nlsolve.series import Array
+from nlsolve.small import DenseLU, SmallProblem
+from nlsolve.solvers import KeptTangent, NonlinearSolver, RefreshRule, Step
+from nlsolve.status import Status
+from nlsolve.tangent import Tangent
+from nlsolve.testing.promises import require, same
+
+
+def check_solver(solver: NonlinearSolver, rule: RefreshRule | None = None) -> None:
+    """The start comes first and is left as it was, like every state after it; a small problem is solved to 1e-10 under
+    the driver; what linear solver and problem were asked for is in the ledger.
+    """
+    problem, ledger, asked_before = SmallProblem(), Ledger(), DenseLU.asked.copy()
+    tangent = Tangent(DenseLU(), rule, ledger)
+    start = SmallProblem.solution + 0.5 * np.cos(np.arange(12.0))
+    kept = start.copy()
+    seen: list[tuple[Array, Array]] = []
+
+    class Watched(NonlinearSolver):
+        def steps(self, problem: NonlinearProblem, tangent: KeptTangent, start: Array) -> Iterator[Step]:
+            for step in solver.steps(problem, tangent, start):
+                seen.append((step.state, step.state.copy()))
+                yield step
+
+    outcome = solve(problem, Watched(), tangent, start, StoppingTest(tolerance=1e-11), Budget(), ledger)
+    require(outcome.status is Status.CONVERGED, f"a small convex problem was not solved: {outcome.detail}")
+    same(outcome.state, SmallProblem.solution, 1.0, "the solution of the small problem")
+    require(np.array_equal(seen[0][1], kept), "the first state yielded must be the start itself")
+    require(np.array_equal(start, kept), "the method changed the array it was given as its start")
+    require(all(np.array_equal(a, b) for a, b in seen), "the method changed a state after it had yielded it")
+    counts = ledger.counts
+    require(counts["triangular_solve"] > 0, "the method never used K*: tangent.solve is where its work shows")
+    require(counts["residual"] + counts["series_order"] > 0, "the method asked for no residual and no coefficient")
+    for kind, asked in (DenseLU.asked - asked_before).items():
+        require(counts[kind] == asked, f"{asked} of kind {kind} were asked for and {counts[kind]} are in the ledger")
