@@ -22,8 +22,8 @@ VARIANT = "variant"
 UNDOTTED = ("record", "counterpart")
 """Parameters of a case that are no table, or may be none."""
 
-OUTCOME, SOLVED = "outcome", "solved"
-"""Columns that tables derive from the others, see `outcome` and `solved`."""
+OUTCOME, SOLVED, SPEEDUP = "outcome", "solved", "speedup"
+"""Columns that tables derive from the others: see `outcome`, `solved`, and `against` of tables."""
 
 RIGHT, DOUBTED, WRONG = "right", "doubted", "wrong"
 

@@ -15,7 +15,7 @@ from nlsolve.component import Component
 from nlsolve.condense import COUNT, WITHIN
 from nlsolve.errors import Problem, StudyError
 from nlsolve.locate import Place
-from nlsolve.outcomes import OUTCOME, SOLVED, VARIANT, names_settings
+from nlsolve.outcomes import OUTCOME, SOLVED, SPEEDUP, VARIANT, names_settings
 
 Document = dict[str, Any]
 
@@ -81,7 +81,7 @@ class Sweep(BaseModel):
     def _values(self) -> Sweep:
         if sum(mode is not None for mode in (self.grid, self.zip, self.each)) != 1:
             raise ValueError("a sweep has one of grid, zip and each")
-        if not names_settings(self.name) or self.name in (OUTCOME, SOLVED, WITHIN, COUNT):
+        if not names_settings(self.name) or self.name in (OUTCOME, SOLVED, SPEEDUP, WITHIN, COUNT):
             raise ValueError(f"name = {self.name!r} is a column of the results already; choose another")
         if self.each is None and self.name != VARIANT:
             raise ValueError(f"name = {self.name!r} is for the names of each, and there are none; drop it")

@@ -264,6 +264,7 @@ def test_a_kept_declaration_reads_back_the_same():
         ({"value": ["solved", "seconds"]}, 'value = "solved" shows shares.*drop the other values'),
         ({"value": "solved", "cheapest": {}}, 'value = "solved" shows shares.*drop cheapest'),
         ({"interval": 1.0}, "less than 1"),
+        ({"value": "speedup"}, "a speedup compares with a run: say with which"),
         ({"cheapest": {"within": []}}, "at least 1 item"),
         ({"accepted": 0}, "greater than 0"),
     ],
@@ -276,3 +277,27 @@ def test_declarations_that_contradict_themselves(fields, sentence):
 def test_names_of_files_are_plain():
     with pytest.raises(ValidationError, match="pattern"):
         spec(name="../t")
+
+
+# Speed beside a run.
+
+
+def test_a_speedup_is_seconds_over_seconds_in_the_same_column():
+    table = build(spec(value="speedup", against={"solver.order": 10}), runs(seconds=[3.0, 8.0, 1.5, 2.0]))
+    assert table.cells.to_numpy().tolist() == [[1.0, 1.0], [2.0, 4.0]]
+
+
+def test_a_run_has_no_speedup_without_the_other_or_where_one_failed():
+    given = {"value": "speedup", "against": {"solver.order": 10}}
+    table = build(spec(**given), runs(status=["diverged", "converged", "converged", "diverged"]))
+    assert table.words.to_numpy().tolist() == [["diverged", "1"], ["–", "diverged"]]
+    absent = build(spec(value="speedup", against={"solver.order": 99}), runs())
+    assert absent.words.to_numpy().tolist() == [["–", "–"], ["–", "–"]]
+
+
+def test_a_speedup_against_an_unknown_column():
+    (problem,) = check(
+        spec(value="speedup", against={"solver.ordr": 10}), [{"solver.order": 10, "solver.tolerance": 1}]
+    )
+    assert problem.place == ("against",)
+    assert "did you mean 'solver.order'?" in problem.expected

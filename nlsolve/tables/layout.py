@@ -11,11 +11,11 @@ import pandas as pd
 from nlsolve.columns import RUNS
 from nlsolve.condense import key_of
 from nlsolve.errors import ABSENT, Problem, StudyError, did_you_mean
-from nlsolve.outcomes import AT_A_SOLUTION, OUTCOME, SOLVED, outcome, solved
+from nlsolve.outcomes import AT_A_SOLUTION, OUTCOME, SOLVED, SPEEDUP, number, outcome, solved
 from nlsolve.tables.spec import TableSpec
 from nlsolve.tables.table import Table
 
-MEASURED = (*RUNS, OUTCOME, SOLVED)
+MEASURED = (*RUNS, OUTCOME, SOLVED, SPEEDUP)
 """Columns that are known only when a case has been run."""
 
 
@@ -23,7 +23,10 @@ def build(spec: TableSpec, runs: pd.DataFrame) -> Table:
     """The declared table of these runs. Raises StudyError when two runs claim one cell or a name is unknown."""
     records = [dict(zip(runs.columns, row, strict=True)) for row in runs.itertuples(index=False)]
     judged = (spec.accepted, spec.error)
-    records = [{**run, OUTCOME: outcome(run, *judged), SOLVED: solved(run, *judged)} for run in records]
+    records = [
+        {**run, OUTCOME: outcome(run, *judged), SOLVED: solved(run, *judged), SPEEDUP: _speedup(spec, run, records)}
+        for run in records
+    ]
     problems = check(spec, records)
     if problems:
         raise StudyError(*(f"table {spec.name!r}: {problem.expected}" for problem in problems))
@@ -59,6 +62,7 @@ def check(spec: TableSpec, runs: Sequence[Mapping[str, Any]], measured: Iterable
             (("columns",), spec.columns),
             (("value",), () if spec.count else spec.value),
             (("where",), spec.where),
+            (("against",), spec.against),
             (("cheapest", "cost"), contest[:1]),
             (("cheapest", "error"), contest[1:]),
             *((("crossover", field), columns) for field, columns in axes.items()),
@@ -92,6 +96,16 @@ def check(spec: TableSpec, runs: Sequence[Mapping[str, Any]], measured: Iterable
             expected = f"should be {height} lists of {width} numbers, as the table has; there are lists of {lengths}"
             return [Problem(("paper", "values"), [list(row) for row in spec.paper.values], expected)]
     return []
+
+
+def _speedup(spec: TableSpec, run: Mapping[str, Any], runs: Sequence[Mapping[str, Any]]) -> float:
+    """Seconds of the run that `against` names, like this one in the rest of rows and columns, over this one's."""
+    if not spec.against or run["status"] not in AT_A_SOLUTION:
+        return float("nan")
+    wanted = {name: run.get(name) for name in (*spec.rows, *spec.columns)} | spec.against
+    bases = [other for other in runs if all(_same(other.get(name), value) for name, value in wanted.items())]
+    known = len(bases) == 1 and bases[0]["status"] in AT_A_SOLUTION and number(run.get("seconds")) > 0.0
+    return number(bases[0].get("seconds")) / number(run["seconds"]) if known else float("nan")
 
 
 def _fits(spec: TableSpec, run: Mapping[str, Any]) -> bool:

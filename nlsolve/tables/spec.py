@@ -12,7 +12,7 @@ from nlsolve.audit import ACCEPTED
 from nlsolve.component import Component
 from nlsolve.condense import COUNT, NO_RUN, WITHIN, Cheapest, counted, success
 from nlsolve.crossover import Crossover
-from nlsolve.outcomes import SOLVED
+from nlsolve.outcomes import SOLVED, SPEEDUP
 from nlsolve.papers import PaperValues
 
 SHARE = ".2f"
@@ -34,11 +34,17 @@ class TableSpec(Component):
     columns: Names = Field((), description="column or columns of `runs` that tell the columns apart")
     value: Names = Field(
         (),
-        description="column or columns of `runs` shown in the cells, or `outcome`; `solved`: the share of a cell's "
-        "runs that are solved, with its interval; with count: runs, solved",
+        description="column or columns of `runs` shown in the cells, or `outcome`; `speedup`: seconds of the run named "
+        "by `against` over those of the run; `solved`: the share of a cell's runs that are solved, with its interval; "
+        "with count: runs, solved",
     )
     where: dict[str, Scalar | list[Scalar]] = Field(
         default_factory=dict, description="column of `runs` -> value, or list of values, a run must have"
+    )
+    against: dict[str, Scalar] = Field(
+        default_factory=dict,
+        description="column of `runs` -> value of the run that `speedup` compares with; elsewhere it is like the run "
+        "in rows and columns",
     )
     caption: str = Field("", description="sentence above the table")
     format: str | None = Field(None, description='Python format of a number, such as ".2e"; absent: four digits')
@@ -83,6 +89,8 @@ class TableSpec(Component):
         if not self.count and SOLVED in self.value and (len(self.value) > 1 or self.cheapest is not None):
             drop = "cheapest" if self.cheapest is not None else "the other values"
             raise ValueError(f'value = "solved" shows shares of all the runs of a cell; drop {drop}')
+        if SPEEDUP in self.value and not self.against:
+            raise ValueError('a speedup compares with a run: say with which, as in against = { variant = "newton" }')
         if self.paper is not None and (self.success or self.cheapest is not None):
             raise ValueError("paper values are compared number by number, so not with cheapest or shares solved")
         return self
