@@ -70,7 +70,7 @@ class Snes:
         before = _log()
         try:
             self._snes.solve(None, self._u)
-        except Exception:
+        except Exception:  # PETSc's own, or its wrapping of what a callback of ours raised, which is raised below
             if served.error is None:
                 raise
         finally:
