@@ -243,7 +243,7 @@ def left_out(runs: pd.DataFrame) -> list[str]:
         over = int((values > limit.largest).sum())
         word = f"  in {count(over)}: {limit.sentence}" if over else ""
         if len(values):
-            lines.append(f"  {name.removeprefix('audit.').replace('_', ' '):<21} {values.max():<8.2g}{word}".rstrip())
+            lines.append(f"  {name.removeprefix('audit.').replace('_', ' '):<23} {values.max():<8.2g}{word}".rstrip())
     return ["What the scenes left out, at its largest:", *lines] if lines else []
 
 

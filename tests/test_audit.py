@@ -208,7 +208,7 @@ def test_the_command_line_tells_the_worst_values_and_what_to_do() -> None:
     assert heading == "What the scenes left out, at its largest:"
     assert inertia.split() == ["inertia", "1e-06"]
     assert resolution.split("  in 1 case: ") == [
-        "  resolution            2       ",
+        "  resolution              2       ",
         LIMITS["audit.resolution"].sentence,
     ]
     assert left_out(runs.assign(**{name: np.nan for name in LIMITS})) == []
