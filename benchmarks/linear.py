@@ -22,8 +22,8 @@ from operators import setup
 from threadpoolctl import threadpool_limits
 
 import nlsolve
-from nlsolve.flow import Flow
-from nlsolve.registry import load_registry
+from nlsolve.flow.momentum import Flow
+from nlsolve.registry.registry import load_registry
 
 FORMS: dict[str, dict[str, Any]] = {
     "mls, stress between nodes": {"kind": "mls"},

@@ -14,14 +14,14 @@ import sys
 from typing import Any
 
 import numpy as np
-from nlsolve_collocation.assembly import Gradient
-from nlsolve_collocation.collocation import GRADIENT, Collocation
-from nlsolve_collocation.triangles import Triangles
+from nlsolve_discretizers.collocation import GRADIENT, Collocation
+from nlsolve_discretizers.weights.assembly import Gradient
+from nlsolve_discretizers.weights.triangles import Triangles
 from steps_cost import median_seconds
 from threadpoolctl import threadpool_limits
 
 import nlsolve
-from nlsolve.flow import Flow
+from nlsolve.flow.momentum import Flow
 
 try:
     from rbf.pde.fd import weight_matrix

@@ -18,7 +18,7 @@ import time
 from typing import Any
 
 import nlsolve
-from nlsolve import ledger
+from nlsolve.solving import ledger
 
 INCREMENTS = 6
 SCENES: dict[str, dict[str, Any]] = {

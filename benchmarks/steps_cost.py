@@ -17,7 +17,7 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 import nlsolve
-from nlsolve.flow import Flow
+from nlsolve.flow.momentum import Flow
 
 ORDER = 20
 MOVED = "operators of a moved cloud"

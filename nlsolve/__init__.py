@@ -1,63 +1,44 @@
-"""Compare nonlinear solution strategies on equal terms."""
+"""Compare nonlinear solution strategies on equal terms: the users' door.
 
+Every name is loaded when it is first asked for, so that `import nlsolve` costs nothing.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
 from importlib.metadata import PackageNotFoundError, version
+from typing import TYPE_CHECKING, Any
 
-from nlsolve.assembled import AssembledOnce
-from nlsolve.component import Component
-from nlsolve.discretizers import Discretizer, Operators
-from nlsolve.globalization import Globalization, Search
-from nlsolve.hookspecs import hookimpl
-from nlsolve.laws import ConstitutiveLaw, PowerForm, local_index, stress
-from nlsolve.linear import Factors, LinearSolver
-from nlsolve.nested import Globalized
-from nlsolve.predictors import Predictor
-from nlsolve.problems import Expansion, NonlinearProblem
-from nlsolve.runner import Results, run
-from nlsolve.scenes import Cloud, Exact, Scene
-from nlsolve.series import Series, upright
-from nlsolve.solvers import Evidence, KeptTangent, NonlinearSolver, RefreshRule, Step
-from nlsolve.status import SolveError, Status
-from nlsolve.studies import Study
-from nlsolve.systems import System
+if TYPE_CHECKING:
+    from nlsolve.contracts.status import SolveError, Status
+    from nlsolve.running.runner import Results, run
+    from nlsolve.study.study import Study
 
 try:
     __version__ = version("nlsolve")
 except PackageNotFoundError:  # a checkout on the path, not installed: no plugins either
     __version__ = "not installed"
 
-__all__ = [
-    "AssembledOnce",
-    "Cloud",
-    "Component",
-    "ConstitutiveLaw",
-    "Discretizer",
-    "Evidence",
-    "Exact",
-    "Expansion",
-    "Factors",
-    "Globalization",
-    "Globalized",
-    "KeptTangent",
-    "LinearSolver",
-    "NonlinearProblem",
-    "NonlinearSolver",
-    "Operators",
-    "PowerForm",
-    "Predictor",
-    "RefreshRule",
-    "Results",
-    "Scene",
-    "Search",
-    "Series",
-    "SolveError",
-    "Status",
-    "Step",
-    "Study",
-    "System",
-    "__version__",
-    "hookimpl",
-    "local_index",
-    "run",
-    "stress",
-    "upright",
-]
+_HOME = {
+    "Results": "nlsolve.running.runner",
+    "SolveError": "nlsolve.contracts.status",
+    "Status": "nlsolve.contracts.status",
+    "Study": "nlsolve.study.study",
+    "run": "nlsolve.running.runner",
+}
+
+__all__ = ["Results", "SolveError", "Status", "Study", "__version__", "run"]
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOME:
+        raise AttributeError(
+            f"module 'nlsolve' has no attribute {name!r}: what plugins are written with is in nlsolve.plugin"
+        )
+    value = getattr(import_module(_HOME[name]), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return __all__

@@ -4,22 +4,24 @@ from __future__ import annotations
 
 from typing import Any
 
-from nlsolve_collocation import MovingLeastSquares
+from nlsolve_discretizers import MovingLeastSquares
 from nlsolve_laws import PowerLaw
-from nlsolve_newton import Newton
-from nlsolve_predictors import Previous
-from nlsolve_refresh import EveryIteration
+from nlsolve_linear.superlu import SuperLU
+from nlsolve_rules.predictors import Previous
+from nlsolve_rules.refresh import EveryIteration
 from nlsolve_scenes import StirringTool
-from nlsolve_scenes.rings import Rings
-from nlsolve_superlu import SuperLU
+from nlsolve_scenes.nodes.rings import Rings
+from nlsolve_solvers import Newton
 
-from nlsolve import NonlinearProblem, NonlinearSolver, RefreshRule, Scene
-from nlsolve.driver import Budget, Outcome, StoppingTest, solve
-from nlsolve.flow import Flow
-from nlsolve.ledger import Ledger
+from nlsolve.flow.momentum import Flow
+from nlsolve.flow.setup import Setup
+from nlsolve.plugin import NonlinearProblem, NonlinearSolver, RefreshRule, Scene
 from nlsolve.series import Array
-from nlsolve.setup import Setup
-from nlsolve.tangent import Tangent
+from nlsolve.solving.driver import solve
+from nlsolve.solving.ledger import Ledger
+from nlsolve.solving.outcome import Outcome
+from nlsolve.solving.stopping import Budget, StoppingTest
+from nlsolve.solving.tangent import Tangent
 
 PLAIN = SuperLU(ordering="mmd-ata")  # no trials of orderings in the counts
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from nlsolve_laws import PowerLaw
 from nlsolve_scenes import Channel, StirringTool
-from nlsolve_scenes.rings import GradedRings, Rings
+from nlsolve_scenes.nodes.rings import GradedRings, Rings
 
 from nlsolve.series import Array
 

@@ -11,7 +11,8 @@ import pandas as pd
 from pydantic import Field
 from scipy.sparse import csc_array
 
-from nlsolve import (
+from nlsolve.flow.setup import Progress, Record, Setup
+from nlsolve.plugin import (
     Cloud,
     Component,
     ConstitutiveLaw,
@@ -27,8 +28,7 @@ from nlsolve import (
     Step,
     hookimpl,
 )
-from nlsolve.registry import Registry
-from nlsolve.setup import Progress, Record, Setup
+from nlsolve.registry.registry import Registry
 
 
 class Even(Component):

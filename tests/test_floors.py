@@ -1,8 +1,10 @@
-"""The house stands: imports go downwards only, none hides in a function, and plugins use the front door."""
+"""The house stands: each package imports what its own docstring says it may, and plugins use their door."""
 
 from __future__ import annotations
 
 import ast
+import re
+import subprocess
 import sys
 from collections.abc import Iterator
 from graphlib import TopologicalSorter
@@ -11,23 +13,40 @@ from pathlib import Path
 import pytest
 
 import nlsolve
+import nlsolve.plugin
 
 HOUSE = Path(nlsolve.__file__).parent
 PLUGINS = HOUSE.parent / "plugins"
-
-FLOORS = [
-    "series component status columns",
-    "laws scenes systems discretizers linear problems assembled predictors globalization solvers",
-    "flow algebra compression tangent pressure motion start setup balance march measures estimate audit ledger driver",
-    "hookspecs registry nested",
-    "studies composition locate errors outcomes shares condense sweeps references runner store tables papers report "
-    "plan diagnose figures costs predictions envelope crossover",
-    "testing small cli progress __init__",
-]
-FLOOR = {name: number for number, names in enumerate(FLOORS) for name in names.split()}
+MOST_ENTRIES, MOST_FILES = 15, 10
+LIBRARIES = {"nlsolve", "numpy", "scipy", "pydantic", "meshio", "rslab", "mpi4py", "petsc4py", "sundials4py"}
+PROMISE = re.compile(r"\bmay import ([a-z, ]+?)\.", re.DOTALL)
+DOORS = {"__init__", "plugin"}
 MODULES = sorted(HOUSE.rglob("*.py"))
 PLUGIN_MODULES = sorted(PLUGINS.rglob("*.py"))
-LIBRARIES = {"nlsolve", "numpy", "scipy", "pydantic", "meshio", "rslab", "mpi4py", "petsc4py", "sundials4py"}
+
+
+def top_of(path: Path) -> str:
+    """The package, or the module, at the top of the house that a file belongs to."""
+    return path.relative_to(HOUSE).with_suffix("").parts[0]
+
+
+def allowed_by(docstring: str) -> set[str]:
+    """The packages that a package's docstring says it may import: "It may import series, contracts and results."."""
+    found = PROMISE.search(docstring)
+    assert found, f"no sentence 'It may import …' in {docstring!r}"
+    return {name for name in re.split(r",\s*|\s+and\s+", found[1].strip())}
+
+
+def rules_of(house: Path) -> dict[str, set[str]]:
+    """Package -> packages that it may import; a module at the top that is no door imports nothing."""
+    rules: dict[str, set[str]] = {}
+    for path in sorted(house.iterdir()):
+        if (path / "__init__.py").exists():
+            docstring = ast.get_docstring(ast.parse((path / "__init__.py").read_text(encoding="utf-8")))
+            rules[path.name] = allowed_by(docstring or "")
+        elif path.suffix == ".py" and path.stem not in DOORS:
+            rules[path.stem] = set()
+    return rules
 
 
 def imports(path: Path) -> Iterator[tuple[str, list[str]]]:
@@ -40,41 +59,72 @@ def imports(path: Path) -> Iterator[tuple[str, list[str]]]:
             yield node.module or "", [alias.name for alias in node.names]
 
 
-def name_of(path: Path) -> str:
-    """A module's name inside the house: "march", "figures.line", "figures", "__init__"."""
-    parts = path.relative_to(HOUSE).with_suffix("").parts
-    return ".".join(parts[:-1] if parts[-1] == "__init__" and len(parts) > 1 else parts)
+def tops_imported(path: Path) -> set[str]:
+    """What a file imports of the house, by the top of it."""
+    return {module.split(".")[1] for module, _ in imports(path) if module.startswith("nlsolve.")} | {
+        name for module, names in imports(path) if module == "nlsolve" for name in names
+    }
 
 
-NAMES = {name_of(path) for path in MODULES}
-
-
-def floor_of(name: str) -> int:
-    """A package stands on one floor with all its modules."""
-    return FLOOR[name.split(".")[0]]
-
-
-def inside(path: Path) -> set[str]:
-    """Modules of the house that a file imports."""
-    found = set()
-    for module, names in imports(path):
-        if module == "nlsolve":
-            found |= {name if name in NAMES else "__init__" for name in names}
-        elif module.startswith("nlsolve."):
-            found.add(module.removeprefix("nlsolve."))
+def trespasses(house: Path) -> list[str]:
+    """Every import that a package's own docstring does not allow, in a sentence."""
+    rules, found = rules_of(house), []
+    for path in sorted(house.rglob("*.py")):
+        top = path.relative_to(house).with_suffix("").parts[0]
+        if top not in DOORS:
+            wrong = tops_imported(path) - rules[top] - {top}
+            found += [f"{path.relative_to(house)} imports {name}: {top} may not" for name in sorted(wrong)]
     return found
 
 
-@pytest.mark.parametrize("path", MODULES, ids=name_of)
-def test_imports_go_downwards(path):
-    name = name_of(path)
-    assert name.split(".")[0] in FLOOR, "a new module belongs to a floor"
-    above = {other for other in inside(path) if floor_of(other) > floor_of(name)}
-    assert not above, f"{name} (floor {floor_of(name)}) imports {above}"
+def test_each_package_imports_what_it_says_it_may():
+    assert trespasses(HOUSE) == []
 
 
-def test_neighbours_do_not_import_each_other_in_a_circle():
-    TopologicalSorter({name_of(path): inside(path) for path in MODULES}).prepare()
+def test_the_rules_themselves_go_one_way():
+    order = list(TopologicalSorter(rules_of(HOUSE)).static_order())
+    assert order[0] == "series"
+
+
+def test_an_import_that_goes_upwards_is_found(tmp_path):
+    """Planted: contracts import solving."""
+    (tmp_path / "low").mkdir()
+    (tmp_path / "low" / "__init__.py").write_text('"""Low. It may import series."""\n')
+    (tmp_path / "high").mkdir()
+    (tmp_path / "high" / "__init__.py").write_text('"""High. It may import low and series."""\n')
+    (tmp_path / "series.py").write_text("")
+    (tmp_path / "high" / "good.py").write_text("from nlsolve.low import thing\nfrom nlsolve.series import Array\n")
+    assert trespasses(tmp_path) == []
+    (tmp_path / "low" / "bad.py").write_text("def f():\n    from nlsolve.high.good import thing\n")
+    assert trespasses(tmp_path) == ["low/bad.py imports high: low may not"]
+
+
+def module_name(path: Path) -> str:
+    parts = path.relative_to(HOUSE.parent).with_suffix("").parts
+    return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
+
+
+def test_modules_do_not_import_each_other_in_a_circle():
+    names = {module_name(path) for path in MODULES}
+    graph = {}
+    for path in MODULES:
+        if top_of(path) in DOORS:
+            continue
+        targets = set()
+        for module, imported in imports(path):
+            targets |= {f"{module}.{name}" for name in imported if f"{module}.{name}" in names}
+            targets |= {module} & names if not targets & {f"{module}.{name}" for name in imported} else set()
+        graph[module_name(path)] = targets - {module_name(path), "nlsolve"}
+    TopologicalSorter(graph).prepare()
+
+
+@pytest.mark.parametrize("house", [HOUSE, PLUGINS], ids=["nlsolve", "plugins"])
+def test_a_listing_can_be_read_at_a_glance(house):
+    entries = [path for path in HOUSE.iterdir() if path.name != "__pycache__"]
+    assert len(entries) <= MOST_ENTRIES, sorted(path.name for path in entries)
+    for folder in {path.parent for path in house.rglob("*.py")} - {house}:
+        files = sorted(path.name for path in folder.glob("*.py"))
+        assert len(files) <= MOST_FILES, f"{folder.name} holds {len(files)} files: {files}"
 
 
 @pytest.mark.parametrize("path", [*MODULES, *PLUGIN_MODULES], ids=lambda path: f"{path.parent.name}-{path.stem}")
@@ -86,15 +136,29 @@ def test_no_import_inside_a_function(path):
 
 
 @pytest.mark.parametrize("path", PLUGIN_MODULES, ids=lambda path: f"{path.parent.name}-{path.stem}")
-def test_plugins_use_public_names_only(path):
+def test_plugins_use_their_door_only(path):
     own = path.relative_to(PLUGINS).parts[0]
     for module, names in imports(path):
         top = module.split(".")[0]
         assert top in LIBRARIES | {own} or top in sys.stdlib_module_names, f"{path.name} imports {module}"
         if top == "nlsolve":
-            assert module == "nlsolve", f"{path.name} reaches past the public names into {module}"
-            assert set(names) <= set(nlsolve.__all__), f"{path.name}: {set(names) - set(nlsolve.__all__)} is not public"
+            assert module == "nlsolve.plugin", f"{path.name} reaches past its door into {module}"
+            missing = set(names) - set(nlsolve.plugin.__all__)
+            assert not missing, f"{path.name}: {missing} is not public"
 
 
-def test_public_names_are_there():
-    assert all(hasattr(nlsolve, name) for name in nlsolve.__all__)
+@pytest.mark.parametrize("door", [nlsolve, nlsolve.plugin], ids=["users", "plugin-authors"])
+def test_public_names_are_there(door):
+    assert all(hasattr(door, name) for name in door.__all__)
+
+
+@pytest.mark.parametrize(
+    "statement",
+    ["import nlsolve", "import sys; sys.argv = ['nlsolve', '--version']; import nlsolve.cli.main as m; m.main()"],
+)
+def test_the_door_and_the_version_load_no_heavy_library(statement):
+    """In a process of its own: what is loaded is looked at, not how long that takes."""
+    heavy = ("matplotlib", "pyarrow", "pandas", "jinja2", "scipy", "typer")
+    code = f"{statement}\nimport sys\nprint([name for name in {heavy!r} if name in sys.modules])"
+    told = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
+    assert told.splitlines()[-1] == "[]"

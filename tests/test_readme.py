@@ -7,9 +7,9 @@ import tomllib
 from pathlib import Path
 from types import ModuleType
 
-from nlsolve import NonlinearSolver
-from nlsolve.registry import Registry
-from nlsolve.studies import Study
+from nlsolve.plugin import NonlinearSolver
+from nlsolve.registry.registry import Registry
+from nlsolve.study.study import Study
 from nlsolve.testing import check_solver
 
 ROOT = Path(__file__).parent.parent

@@ -13,7 +13,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from nlsolve import Series, series, upright
+from nlsolve import series
+from nlsolve.plugin import Series, upright
 from nlsolve.series import Array
 
 ORDER = 30

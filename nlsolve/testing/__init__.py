@@ -5,20 +5,19 @@
 
 A check takes an instance, runs it through what its contract promises, and raises AssertionError with a sentence that
 says which promise was broken and by how much. The numbers it draws are seeded: a check fails always or never.
+
+It may import series, contracts, solving, flow and algebra.
 """
 
 from __future__ import annotations
 
 from nlsolve.testing.discretizers import check_discretizer
-from nlsolve.testing.globalization import check_globalization
 from nlsolve.testing.laws import check_law
-from nlsolve.testing.linear import check_linear_solver
-from nlsolve.testing.predictors import check_predictor
+from nlsolve.testing.linear_solvers import check_linear_solver
 from nlsolve.testing.problems import check_problem
-from nlsolve.testing.refresh import check_refresh_rule
-from nlsolve.testing.scenes import check_scene
+from nlsolve.testing.rules import check_globalization, check_predictor, check_refresh_rule
+from nlsolve.testing.scenes import check_scene, check_system
 from nlsolve.testing.solvers import check_solver
-from nlsolve.testing.systems import check_system
 
 __all__ = [
     "check_discretizer",

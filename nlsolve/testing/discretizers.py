@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 
-from nlsolve.discretizers import Discretizer, Operators
-from nlsolve.flow import node_major
-from nlsolve.laws import CONTRACTION
-from nlsolve.scenes import Cloud
+from nlsolve.contracts.continuum.cloud import Cloud
+from nlsolve.contracts.continuum.discretizer import Discretizer, Operators
+from nlsolve.contracts.continuum.law import CONTRACTION
+from nlsolve.flow.momentum import node_major
 from nlsolve.series import Array
 from nlsolve.testing.promises import require, same, shaped
 

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from nlsolve.laws import ConstitutiveLaw
+from nlsolve.contracts.continuum.law import ConstitutiveLaw
 from nlsolve.series import Series
 from nlsolve.testing.promises import ORDER, PARTS, check_coefficients, require, same
 

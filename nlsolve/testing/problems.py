@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from nlsolve.problems import NonlinearProblem
+from nlsolve.contracts.problem import NonlinearProblem
 from nlsolve.series import Array, Series
 from nlsolve.testing.promises import ORDER, PARTS, check_coefficients, norm, require, same
 

@@ -6,15 +6,17 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from nlsolve.driver import Budget, StoppingTest, solve
-from nlsolve.ledger import Ledger
-from nlsolve.problems import NonlinearProblem
+from nlsolve.contracts.nonlinear_solver import KeptTangent, NonlinearSolver, Step
+from nlsolve.contracts.problem import NonlinearProblem
+from nlsolve.contracts.refresh import RefreshRule
+from nlsolve.contracts.status import Status
 from nlsolve.series import Array
-from nlsolve.small import DenseLU, SmallProblem
-from nlsolve.solvers import KeptTangent, NonlinearSolver, RefreshRule, Step
-from nlsolve.status import Status
-from nlsolve.tangent import Tangent
+from nlsolve.solving.driver import solve
+from nlsolve.solving.ledger import Ledger
+from nlsolve.solving.stopping import Budget, StoppingTest
+from nlsolve.solving.tangent import Tangent
 from nlsolve.testing.promises import require, same
+from nlsolve.testing.toy_problem import DenseLU, SmallProblem
 
 
 def check_solver(solver: NonlinearSolver, rule: RefreshRule | None = None) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from nlsolve import Component, hookimpl
+from nlsolve.plugin import Component, hookimpl
 from nlsolve_laws.carreau_yasuda import CarreauYasuda
 from nlsolve_laws.cross import Cross
 from nlsolve_laws.herschel_bulkley import Bingham, HerschelBulkley

@@ -6,7 +6,7 @@ from typing import Any, Literal, Self
 
 from pydantic import Field, model_validator
 
-from nlsolve import ConstitutiveLaw
+from nlsolve.plugin import ConstitutiveLaw
 
 
 class Cross(ConstitutiveLaw):

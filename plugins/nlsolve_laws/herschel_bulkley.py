@@ -7,7 +7,7 @@ from typing import Any, Literal
 import numpy as np
 from pydantic import Field
 
-from nlsolve import ConstitutiveLaw, PowerForm
+from nlsolve.plugin import ConstitutiveLaw, PowerForm
 
 
 class _Yielding(ConstitutiveLaw):

@@ -6,7 +6,7 @@ from typing import Any, Literal
 
 from pydantic import Field
 
-from nlsolve import ConstitutiveLaw, PowerForm
+from nlsolve.plugin import ConstitutiveLaw, PowerForm
 
 
 class PowerLaw(ConstitutiveLaw):

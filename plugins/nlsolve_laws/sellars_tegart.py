@@ -7,7 +7,7 @@ from typing import Any, Literal
 import numpy as np
 from pydantic import Field
 
-from nlsolve import ConstitutiveLaw
+from nlsolve.plugin import ConstitutiveLaw
 
 GAS_CONSTANT = 8.314462618  # R [J/(mol K)]
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from nlsolve import Component, hookimpl
+from nlsolve.plugin import Component, hookimpl
 from nlsolve_scenes.cavity import Cavity
 from nlsolve_scenes.channel import Channel
 from nlsolve_scenes.couette import Couette

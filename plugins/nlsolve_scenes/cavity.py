@@ -7,8 +7,8 @@ from typing import Literal
 import numpy as np
 from pydantic import Field
 
-from nlsolve import Cloud, ConstitutiveLaw
-from nlsolve_scenes.rectangle import Rectangle
+from nlsolve.plugin import Cloud, ConstitutiveLaw
+from nlsolve_scenes.nodes.rectangle import Rectangle
 
 
 class Cavity(Rectangle):

@@ -7,9 +7,9 @@ from typing import Literal, Self
 import numpy as np
 from pydantic import Field, model_validator
 
-from nlsolve import Cloud, ConstitutiveLaw, Exact, Scene
-from nlsolve_scenes.files import NodeFile
-from nlsolve_scenes.scatter import jittered, scatter
+from nlsolve.plugin import Cloud, ConstitutiveLaw, Exact, Scene
+from nlsolve_scenes.nodes.files import NodeFile
+from nlsolve_scenes.nodes.scatter import jittered, scatter
 
 
 class Channel(Scene):

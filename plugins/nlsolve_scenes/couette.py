@@ -8,7 +8,7 @@ import numpy as np
 from pydantic import Field
 from scipy.optimize import brentq
 
-from nlsolve import ConstitutiveLaw, Exact, Series
+from nlsolve.plugin import ConstitutiveLaw, Exact, Series
 from nlsolve_scenes.stirring_tool import StirringTool
 
 SLOWEST = np.log(1e-140)  # log of the smallest shear rate told from rest [1/s]; its square is still a normal number

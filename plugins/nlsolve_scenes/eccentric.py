@@ -8,9 +8,9 @@ from typing import Literal, Self
 import numpy as np
 from pydantic import Field, model_validator
 
-from nlsolve import Cloud, ConstitutiveLaw, Exact, Scene
-from nlsolve_scenes.grading import lines, relative_spacing
-from nlsolve_scenes.scatter import jittered
+from nlsolve.plugin import Cloud, ConstitutiveLaw, Exact, Scene
+from nlsolve_scenes.nodes.grading import lines, relative_spacing
+from nlsolve_scenes.nodes.scatter import jittered
 
 LEAST_ECCENTRICITY = 1e-2  # of the mean gap: the closed form loses as many digits as the poles are far away
 

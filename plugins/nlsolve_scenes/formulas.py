@@ -15,7 +15,7 @@ from typing import Annotated, Any
 import numpy as np
 from pydantic import AfterValidator, Field
 
-from nlsolve import Series
+from nlsolve.plugin import Series
 
 FUNCTIONS = {f.__name__: f for f in (np.sin, np.cos, np.tanh, np.sinh, np.cosh, np.exp, np.log, np.sqrt)}
 CONSTANTS = {"pi": np.float64(np.pi), "e": np.float64(np.e)}

@@ -7,9 +7,9 @@ from typing import Literal, Self
 import numpy as np
 from pydantic import Field, model_validator
 
-from nlsolve import Cloud, ConstitutiveLaw, Exact, Series, SolveError, Status, stress
+from nlsolve.plugin import Cloud, ConstitutiveLaw, Exact, Series, SolveError, Status, stress
 from nlsolve_scenes.formulas import Formula, Jet
-from nlsolve_scenes.rectangle import Rectangle, grid
+from nlsolve_scenes.nodes.rectangle import Rectangle, grid
 
 SAMPLES = 21  # a side: points at which the field is looked at before it is accepted
 ROUNDING = 1e-10  # of the largest velocity gradient: the divergence that is none

@@ -7,9 +7,9 @@ from typing import Annotated, Literal, Self
 import numpy as np
 from pydantic import Field, model_validator
 
-from nlsolve import Cloud, ConstitutiveLaw, Exact, Scene, SolveError, Status, local_index
-from nlsolve_scenes.files import NodeFile
-from nlsolve_scenes.rings import Auto, GradedRings, Rings, Scattered
+from nlsolve.plugin import Cloud, ConstitutiveLaw, Exact, Scene, SolveError, Status, local_index
+from nlsolve_scenes.nodes.files import NodeFile
+from nlsolve_scenes.nodes.rings import Auto, GradedRings, Rings, Scattered
 
 Nodes = Annotated[Rings | GradedRings | Scattered | Auto | NodeFile, Field(discriminator="kind")]
 ON_CIRCLE = 1e-3  # largest distance of a wall's node of a file from its circle, in radii

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from nlsolve import Component, hookimpl
+from nlsolve.plugin import Component, hookimpl
 from nlsolve_systems.bratu import Bratu
 from nlsolve_systems.chandrasekhar import Chandrasekhar
 from nlsolve_systems.p_laplacian import PLaplacian

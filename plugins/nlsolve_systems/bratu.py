@@ -7,7 +7,7 @@ from typing import Any, Literal
 import numpy as np
 from pydantic import Field
 
-from nlsolve import System
+from nlsolve.plugin import System
 from nlsolve_systems.grids import minus_laplacian, on_points, places
 
 STEEPEST = 1e3  # u′(0) up to which roots are looked for

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from nlsolve import upright
+from nlsolve.plugin import upright
 from nlsolve_systems.more import discrete_integral, watson_interior
 
 TINY = 1e-4

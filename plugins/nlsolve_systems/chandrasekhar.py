@@ -7,7 +7,7 @@ from typing import Any, Literal
 import numpy as np
 from pydantic import Field
 
-from nlsolve import System
+from nlsolve.plugin import System
 from nlsolve_systems.burkardt import chandrasekhar_at
 
 SLOWEST = 0.97  # contraction of the iteration that finds the root

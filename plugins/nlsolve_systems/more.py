@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 
-from nlsolve import upright
+from nlsolve.plugin import upright
 
 
 def numbers(u: Any) -> np.ndarray:

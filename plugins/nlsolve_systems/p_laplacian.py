@@ -10,7 +10,7 @@ from typing import Any, Literal
 import numpy as np
 from pydantic import Field
 
-from nlsolve import System
+from nlsolve.plugin import System
 from nlsolve_systems.grids import on_points, places, slopes
 
 BISECTIONS = 200

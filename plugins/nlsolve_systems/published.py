@@ -8,7 +8,7 @@ from typing import Any, Literal
 import numpy as np
 from pydantic import Field, model_validator
 
-from nlsolve import System
+from nlsolve.plugin import System
 from nlsolve_systems.catalogue import PROBLEMS, Listed
 
 

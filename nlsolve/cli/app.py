@@ -1,0 +1,270 @@
+"""The command line: run, validate, plan, diagnose, plugins, table. Data on standard output, all else on error."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import asdict
+from enum import IntEnum
+from importlib.metadata import version
+from pathlib import Path
+from typing import Annotated, Any
+
+import pandas as pd
+import typer
+from pydantic_core import to_jsonable_python
+from rich.console import Console
+from rich.markup import escape
+from rich.table import Table as RichTable
+
+from nlsolve.cli.progress import Watch
+from nlsolve.flow.validity import LIMITS
+from nlsolve.registry.problems import StudyError, did_you_mean
+from nlsolve.registry.registry import PluginRow, load_registry
+from nlsolve.running.diagnose import diagnose as diagnostics_of
+from nlsolve.running.forecast import ASSUMPTION, forecast
+from nlsolve.running.runner import Results
+from nlsolve.running.runner import run as run_study
+from nlsolve.running.store import StoreError, read_tables
+from nlsolve.show.tables import build
+from nlsolve.study.study import Study
+from nlsolve.study.sweeps import parse_assignments
+
+
+class ExitCode(IntEnum):
+    """What the shell is told."""
+
+    COMPLETE = 0
+    CRASHED = 1
+    INVALID = 2
+    INTERRUPTED = 130
+
+
+UNFOLDED = 400
+"""Characters a line may have in a file or a pipe."""
+
+app = typer.Typer(
+    help="Compare nonlinear solution strategies on equal terms.", no_args_is_help=True, pretty_exceptions_enable=False
+)
+
+StudyFile = Annotated[Path, typer.Argument(metavar="STUDY", help="a study file (TOML)")]
+Settings = Annotated[
+    list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="set a parameter, such as solver.order=20")
+]
+Quick = Annotated[bool, typer.Option("--quick", help="the shrunk study of the file's [quick] section")]
+Json = Annotated[bool, typer.Option("--json", help="machine-readable output")]
+
+
+@app.callback()
+def common(
+    _version: Annotated[
+        bool, typer.Option("--version", is_eager=True, callback=lambda asked: show_version(asked), help="and exit")
+    ] = False,
+) -> None:
+    """Compare nonlinear solution strategies on equal terms."""
+
+
+def show_version(asked: bool) -> None:
+    """Print the version and leave, when asked."""
+    if asked:
+        typer.echo(f"nlsolve {version('nlsolve')}")
+        raise typer.Exit
+
+
+@app.command()
+def run(
+    study: StudyFile,
+    out: Annotated[
+        Path | None, typer.Option(help="results folder; default: results/NAME or results/NAME-quick")
+    ] = None,
+    settings: Settings = None,
+    quick: Quick = False,
+    as_json: Json = False,
+) -> None:
+    """Run a study, or the part of it that is not yet in the results folder."""
+    folder = out or Path("results") / (study.stem + ("-quick" if quick else ""))
+    console = Console(stderr=True)
+    with ending(folder):
+        checked = Study.from_toml(study, parse_assignments(settings or []), quick)
+        with Watch(console) as watch:
+            results = run_study(checked, folder, listen=watch)
+    show_results(results, as_json)
+    for line in left_out(results.runs):
+        say(line)
+    for note in results.notes:
+        say(note)
+    endings = ", ".join(f"{number} {word}" for word, number in results.runs["status"].value_counts().items())
+    say(f"{count(len(results.runs))}: {endings}; results in {folder}")
+    failed = results.runs[~results.runs["status"].isin(["converged", "crashed"])]
+    for _, run in failed.drop_duplicates("status").iterrows():
+        say(f"case {run['case']} ended as {run['status']}: {run['message']}")
+    if results.crashed:
+        first = results.runs[results.runs["status"] == "crashed"].iloc[0]
+        say(f"case {first['case']} crashed: {first['message']}")
+        raise typer.Exit(ExitCode.CRASHED)
+
+
+@app.command()
+def validate(study: StudyFile, settings: Settings = None, as_json: Json = False) -> None:
+    """Check a study, and its quick form if it has one, without running it."""
+    with ending():
+        overrides = parse_assignments(settings or [])
+        checked = Study.from_toml(study, overrides)
+        quick = Study.from_toml(study, overrides, quick=True) if checked.has_quick else None
+    found = {"study": checked.name, "question": checked.question, "cases": len(checked.cases)}
+    found |= {"quick_cases": len(quick.cases)} if quick else {}
+    if as_json:
+        typer.echo(json.dumps(found))
+    else:
+        extra = f" ({len(quick.cases)} with --quick)" if quick else ""
+        typer.echo(f"{study} is valid: {count(len(checked.cases))}{extra}. {checked.question}")
+
+
+@app.command()
+def plan(study: StudyFile, settings: Settings = None, quick: Quick = False, as_json: Json = False) -> None:
+    """List the cases of a study and forecast what they cost."""
+    with ending():
+        checked = Study.from_toml(study, parse_assignments(settings or []), quick)
+        frame = forecast(checked)
+    if as_json:
+        typer.echo(json.dumps({"assumption": ASSUMPTION, "cases": records(frame)}))
+        return
+    swept = list(dict.fromkeys(name for case in checked.cases for name in case.swept))
+    sizes = ["increments", "nodes", "unknowns", "seconds_factorization", "seconds_start", "seconds", "seconds_all"]
+    print_frame(count(len(frame)), frame[["case", *swept, *sizes]])
+    typer.echo(f"{frame['seconds_all'].sum() * checked.timing.rounds:.3g} s in all ({ASSUMPTION})")
+
+
+@app.command()
+def diagnose(study: StudyFile, settings: Settings = None, quick: Quick = False, as_json: Json = False) -> None:
+    """Say how good the operators on the clouds of a study are: supports, balance, reproduction, largest weight."""
+    with ending():
+        frame = diagnostics_of(Study.from_toml(study, parse_assignments(settings or []), quick))
+    if as_json:
+        typer.echo(json.dumps(records(frame)))
+    else:
+        print_frame("Operators, one row each", frame)
+
+
+@app.command()
+def plugins(as_json: Json = False) -> None:
+    """List what is installed: kind by kind, from where, with parameters, and what failed to load."""
+    rows = load_registry().plugins()
+    if as_json:
+        typer.echo(json.dumps(to_jsonable_python([asdict(row) for row in rows])))
+        return
+    table = RichTable()
+    for heading in ("noun", "kind", "from", "parameters"):
+        table.add_column(heading, overflow="fold")
+    for row in rows:
+        table.add_row(row.noun, row.kind, escape(row.source), escape(describe(row)))
+    stdout().print(table)
+
+
+@app.command()
+def table(
+    folder: Annotated[Path, typer.Argument(metavar="DIR", help="a results folder")],
+    name: Annotated[str | None, typer.Argument(help="one declared table; default: all")] = None,
+    as_json: Json = False,
+) -> None:
+    """Print the declared tables of a results folder."""
+    with ending():
+        specs, runs = read_tables(folder)
+        names = [spec.name for spec in specs]
+        if name is not None and name not in names:
+            raise StudyError(f"{folder}: there is no table {name!r}; {did_you_mean(name, names)}")
+        tables = [build(spec, runs) for spec in specs if name in (None, spec.name)]
+    if as_json:
+        typer.echo(json.dumps({table.spec.name: table.long() for table in tables}))
+        return
+    for declared in tables:
+        for printed in declared.rich():
+            stdout().print(printed)
+
+
+@contextmanager
+def ending(folder: Path | None = None) -> Iterator[None]:
+    """Turn invalid input and an interruption into a sentence and an exit code."""
+    try:
+        yield
+    except (StudyError, StoreError) as error:
+        say(str(error))
+        raise typer.Exit(ExitCode.INVALID) from error
+    except KeyboardInterrupt as error:
+        kept = f"; the finished cases are in {folder} and the same command does the rest" if folder else ""
+        say(f"interrupted{kept}")
+        raise typer.Exit(ExitCode.INTERRUPTED) from error
+
+
+def stdout() -> Console:
+    """Standard output; tables are not folded when it is a file or a pipe."""
+    console = Console()
+    return console if console.is_terminal else Console(width=UNFOLDED)
+
+
+def count(cases: int) -> str:
+    """1 case, 2 cases"""
+    return f"{cases} case{'' if cases == 1 else 's'}"
+
+
+def say(sentence: str) -> None:
+    """A line on standard error."""
+    typer.echo(sentence, err=True)
+
+
+def show_results(results: Results, as_json: bool) -> None:
+    """Declared tables, or the endings of all cases when no table is declared; everything as JSON."""
+    tables = results.tables()
+    if as_json:
+        shown = {table.spec.name: table.long() for table in tables}
+        document = {"study": results.study.name, "folder": str(results.folder), "runs": records(results.runs)}
+        typer.echo(json.dumps(document | {"tables": shown, "notes": list(results.notes)}))
+        return
+    for declared in tables:
+        for printed in declared.rich():
+            stdout().print(printed)
+    if not tables:
+        swept = list(dict.fromkeys(name for case in results.study.cases for name in case.swept))
+        print_frame(results.study.question, results.runs[["case", *swept, "status", "message"]])
+
+
+def left_out(runs: pd.DataFrame) -> list[str]:
+    """The worst value of each audit over the cases, and what is to be done about it; nothing when none was made."""
+    lines = []
+    for name, limit in LIMITS.items():
+        values = pd.to_numeric(runs[name]).dropna()
+        over = int((values > limit.largest).sum())
+        word = f"  in {count(over)}: {limit.sentence}" if over else ""
+        if len(values):
+            lines.append(f"  {name.removeprefix('audit.').replace('_', ' '):<23} {values.max():<8.2g}{word}".rstrip())
+    return ["What the scenes left out, at its largest:", *lines] if lines else []
+
+
+def describe(row: PluginRow) -> str:
+    """Parameters, a line each, or the reason why there are none."""
+    if row.failure is not None:
+        return row.failure
+    return "\n".join(f"{p.name}: {p.type} = {p.default}  {p.description}" for p in row.parameters)
+
+
+def print_frame(title: str, frame: pd.DataFrame) -> None:
+    """A frame on standard output."""
+    printed = RichTable(title=escape(title))
+    for heading in frame.columns:
+        printed.add_column(escape(str(heading)), overflow="fold")
+    for row in frame.itertuples(index=False):
+        printed.add_row(*(escape(f"{value:.4g}" if isinstance(value, float) else str(value)) for value in row))
+    stdout().print(printed)
+
+
+def records(frame: pd.DataFrame) -> list[dict[str, Any]]:
+    """Rows for JSON, where a value that is not a number is null."""
+    return [
+        {
+            str(name): None if isinstance(value, float) and not math.isfinite(value) else value
+            for name, value in row.items()
+        }
+        for row in frame.to_dict("records")
+    ]

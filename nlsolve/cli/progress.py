@@ -1,0 +1,68 @@
+"""How a run is watched: a bar on a terminal, plain lines anywhere else, always on standard error."""
+
+from __future__ import annotations
+
+import time
+from types import TracebackType
+from typing import Self
+
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn
+
+from nlsolve.running.runner import Event
+
+SECONDS_BETWEEN_LINES = 10.0
+
+
+class Watch:
+    """Listens to a run. A context, because the bar must be taken down."""
+
+    def __init__(self, console: Console) -> None:
+        self.console = console
+        self.factorizations = 0
+        self.read_back = 0
+        self.begun = self.told = time.monotonic()
+        columns = (BarColumn(8), TextColumn("{task.description}", markup=False))
+        self.bar = Progress(*columns, console=console, disable=not console.is_terminal)
+        self.task = self.bar.add_task("starting", total=None)
+
+    def __enter__(self) -> Self:
+        self.bar.start()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.bar.stop()
+
+    def __call__(self, event: Event) -> None:
+        """Tell an event."""
+        now = event.progress
+        part = 1.0 if event.run is not None else now.increment / now.increments if now is not None else 0.0
+        if event.resumed:
+            self.read_back, self.begun = event.number, time.monotonic()
+        elif event.run is not None:
+            self.factorizations += int(event.run.get("factorizations", 0))
+        words = self.words(event, event.number - 1 + part)
+        self.bar.update(self.task, description=words, total=event.cases, completed=event.number - 1 + part)
+        due = event.run is not None or time.monotonic() - self.told > SECONDS_BETWEEN_LINES
+        if due and not self.console.is_terminal:
+            self.told = time.monotonic()
+            self.console.print(words, markup=False, highlight=False, soft_wrap=True)
+
+    def words(self, event: Event, done: float) -> str:
+        """case 3/16, increment 12/1250, branch 3, 17 factorisations, 140 s left (solver.order = 20)
+
+        The label comes last: a narrow terminal cuts it off, not the numbers.
+        """
+        words = [f"case {event.number}/{event.cases}"]
+        if event.run is not None:
+            words.append(f"{event.run['status']}{' before' if event.resumed else ''}")
+        now = event.progress
+        if now is not None:
+            words.append(f"increment {now.increment}/{now.increments}, branch {now.branches}")
+        words.append(f"{self.factorizations + (now.factorizations if now else 0)} factorisations")
+        computed = done - self.read_back
+        if computed > 0 and done < event.cases:
+            words.append(f"{(time.monotonic() - self.begun) * (event.cases - done) / computed:.0f} s left")
+        return f"{', '.join(words)} ({event.case.label})"

@@ -1,0 +1,73 @@
+"""The nodes of a flow and the named groups of its boundary, and a closed solution at given points."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from nlsolve.contracts.status import SolveError, Status
+from nlsolve.series import Array
+
+Indices = NDArray[np.intp]
+
+
+@dataclass(frozen=True)
+class Cloud:
+    """Nodes (N, 2) [mm] and the named groups of boundary nodes among them.
+
+    Raises SolveError (bad cloud) when a coordinate is not finite or two nodes coincide.
+    """
+
+    nodes: Array
+    boundaries: Mapping[str, Indices]
+
+    def __post_init__(self) -> None:
+        if not np.isfinite(self.nodes).all():
+            bad = int(np.flatnonzero(~np.isfinite(self.nodes).all(axis=1))[0])
+            raise SolveError(Status.BAD_CLOUD, f"node {bad} has a coordinate that is not a finite number")
+        spread = float(np.ptp(self.nodes, axis=0).max())
+        nearest = self.nearest_distance
+        first = int(nearest.argmin())
+        if not nearest[first] > 1e-9 * spread:
+            x, y = self.nodes[first]
+            raise SolveError(Status.BAD_CLOUD, f"two nodes coincide at ({x:.6g}, {y:.6g}): remove one of them")
+
+    @cached_property
+    def nearest_distance(self) -> Array:
+        """Distance of every node to its nearest neighbour, shape (N,) [mm]."""
+        return cKDTree(self.nodes).query(self.nodes, 2)[0][:, 1]
+
+    @cached_property
+    def on_boundary(self) -> NDArray[np.bool_]:
+        """True for nodes of any boundary group, shape (N,)."""
+        mask = np.zeros(len(self.nodes), dtype=bool)
+        for group in self.boundaries.values():
+            mask[group] = True
+        return mask
+
+    @cached_property
+    def interior(self) -> Indices:
+        """Nodes whose velocity is unknown."""
+        return np.flatnonzero(~self.on_boundary)
+
+    @cached_property
+    def boundary(self) -> Indices:
+        """Nodes whose velocity is prescribed."""
+        return np.flatnonzero(self.on_boundary)
+
+    def moved_to(self, nodes: Array) -> Cloud:
+        """The same groups at other places."""
+        return replace(self, nodes=nodes)
+
+
+@dataclass(frozen=True)
+class Exact:
+    """A closed solution: velocity (N, 2) at points (N, 2), and named quantities such as the torque."""
+
+    velocity: Array
+    quantities: Mapping[str, float] = field(default_factory=dict)

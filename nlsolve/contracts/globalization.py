@@ -1,0 +1,37 @@
+"""u ← u + t w : how long the step along a direction w may be. The contract of globalisations.
+
+search = globalization.search(problem)                      # once a solve
+t, residual = search.length(problem, u, R(u), w, promised)  # once a step; the residual is that of u + t w
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from typing import ClassVar, Protocol
+
+from nlsolve.contracts.component import Component
+from nlsolve.contracts.problem import NonlinearProblem
+from nlsolve.series import Array
+
+
+class Search(Protocol):
+    """The step lengths of one solve; it may remember the steps before."""
+
+    def length(
+        self, problem: NonlinearProblem, state: Array, residual: Array, direction: Array, promised: float = 1.0
+    ) -> tuple[float, Array]:
+        """Step length t > 0 and R(state + t direction), (U,).
+
+        promised : the part of ‖R‖ that a full step would take away if R were linear: 1 of Newton's direction, 1 − η of
+        an inexact one with ‖R + J w‖ = η ‖R‖.
+        """
+
+
+class Globalization(Component, ABC):
+    """How a method that proposes directions is kept from going too far along them."""
+
+    noun: ClassVar[str] = "globalization"
+
+    @abstractmethod
+    def search(self, problem: NonlinearProblem) -> Search:
+        """The search of one solve. SolveError (not applicable) where the problem gives it nothing to search on."""

@@ -1,0 +1,79 @@
+"""R(u) = 0 : the contract of nonlinear problems, and of their expansion along a path u(a)."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from nlsolve.contracts.status import SolveError, Status
+from nlsolve.series import Array, Series
+
+
+class Expansion:
+    """R(u(a)) = Σ_j a^j R_j along u(a) = u_0 + a u_1 + … : coefficients of the residual, one order at a time.
+
+    Made by running the residual's own formula on a pushed series, so that there is no second formula to keep in step.
+    """
+
+    def __init__(self, path: Series, residual: Series) -> None:
+        self._path, self._residual = path, residual
+
+    def coefficient(self, j: int) -> Array:
+        """R_j, which needs u_0 … u_j."""
+        return self._residual.coefficient(j)
+
+    def remainder(self, j: int) -> Array:
+        """Q_j of R_j = J u_j + Q_j, where u_j is the next to be appended: R_j as it would be with u_j = 0."""
+        self._path.append(np.zeros(self._path.shape))
+        remainder = self._residual.coefficient(j)
+        self._path.forget(j)
+        return remainder
+
+    def append(self, coefficient: Array) -> None:
+        """Push u_j, the next coefficient of the path."""
+        self._path.append(coefficient)
+
+    def path(self, a: float) -> Array:
+        """u(a), summed over the coefficients appended so far."""
+        return self._path.sum(a)
+
+
+class NonlinearProblem(ABC):
+    """R(u) = 0 for u of shape (U,)."""
+
+    is_gradient: bool = False
+    """True when R is the gradient of a convex potential, so that R(u + t w)·w grows with t for every direction w."""
+
+    @abstractmethod
+    def residual(self, u: Array) -> Array:
+        """R(u), shape (U,)."""
+
+    @abstractmethod
+    def jacobian(self, u: Array) -> Any:
+        """J = ∂R/∂u, a sparse (U, U) matrix."""
+
+    @abstractmethod
+    def expand(self, u: Array) -> Expansion:
+        """The expansion of R around u."""
+
+    def secant(self, u: Array) -> Any:
+        """A(u) with R(u) = A(u) u + c(u), a sparse (U, U) matrix, of a problem that is linear but for its coefficients.
+
+        These stay out of A's own derivative: Picard's matrix. SolveError (not applicable) from a problem without one.
+        """
+        raise SolveError(
+            Status.NOT_APPLICABLE,
+            f"{type(self).__name__} has no secant matrix A(u) with R(u) = A(u) u + c(u): choose a method that needs "
+            "its Jacobian only, such as newton or anderson",
+        )
+
+    def blame(self, u: Array, residual: Array) -> Mapping[str, float]:
+        """Where R(u) = `residual` is largest, and what is special there: columns `blame_…` of a failed solve."""
+        return {"blame_unknown": int(np.nan_to_num(np.abs(residual), nan=np.inf).argmax())}
+
+    def scale(self, u: Array) -> float:
+        """What ‖R‖₂ is compared with to call it small; 1 unless the problem knows the size of what cancels in R."""
+        return 1.0

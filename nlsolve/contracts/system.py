@@ -1,0 +1,81 @@
+"""F(u) = 0, u of shape (U,): the contract of scenes that are no flow but a system of equations, given as one formula.
+
+The formula runs on arrays (U, …) and series alike and acts along the first axis, so that the columns of an array are
+as many states at once: seeded columns give the Jacobian, a pushed series the coefficients of the homotopy. No second
+formula is written for either.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from typing import Any, ClassVar
+
+import numpy as np
+from pydantic import Field
+
+from nlsolve.contracts.component import Component
+from nlsolve.series import Array
+
+
+class System(Component, ABC):
+    """A formula and the state from which its root is sought; roots and a sparsity pattern where they are known.
+
+    class Circle(System):
+        kind: Literal["circle"] = "circle"
+
+        def formula(self, u):
+            x, y = u
+            return np.stack([x**2 + y**2 - 1.0, x - y])
+
+        def standard_start(self):
+            return np.array([1.0, 0.5])
+    """
+
+    noun: ClassVar[str] = "scene"
+
+    factor: float = Field(
+        1.0, gt=0, description="the standard start times this; a start of zeros becomes one of factors (1: as it is)"
+    )
+    perturbation: float = Field(0.0, ge=0, description="seeded noise added to the start, relative to its largest entry")
+    seed: int = Field(0, ge=0, description="of that noise")
+
+    @abstractmethod
+    def formula(self, u: Any) -> Any:
+        """F(u), (U, …) -> (U, …), analytic: of +, −, *, /, powers, indexing, slices, matrices from the left, np.stack,
+        np.concatenate, np.sum and np.cumsum along axis 0, exp, log, sin, …; constants (U,) stand `upright` beside u.
+        """
+
+    @abstractmethod
+    def standard_start(self) -> Array:
+        """The state, shape (U,), from which solvers begin."""
+
+    def start(self) -> Array:
+        """The standard start, made harder by `factor` (Moré, Garbow & Hillstrom 1981) and `perturbation`."""
+        standard = np.asarray(self.standard_start(), dtype=float)
+        if self.factor != 1.0:
+            standard = self.factor * (standard if standard.any() else np.ones_like(standard))
+        noise = np.random.default_rng(self.seed).standard_normal(len(standard))
+        return standard + self.perturbation * (np.abs(standard).max() or 1.0) * noise
+
+    def pattern(self) -> Any | None:
+        """Where the Jacobian may differ from zero, a sparse (U, U) matrix; None: anywhere."""
+        return None
+
+    def roots(self) -> Array | None:
+        """Known roots, shape (K, U), to a relative 1e-12; None where none is known."""
+        return None
+
+    @property
+    def singular(self) -> bool:
+        """True when the Jacobian is singular at a known root: F is flat there, and a small residual says little."""
+        return False
+
+    @property
+    def is_gradient(self) -> bool:
+        """True when F is the gradient of a convex potential."""
+        return False
+
+    def nearest_root(self, u: Array) -> Array | None:
+        """The known root, shape (U,), that is nearest to u; None where none is known."""
+        roots = self.roots()
+        return None if roots is None else roots[np.linalg.norm(roots - u, axis=1).argmin()]

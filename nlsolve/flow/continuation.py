@@ -1,0 +1,146 @@
+"""From rest, where no series and no Newton step has a useful range, to the first state: continuation."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import ClassVar
+
+import numpy as np
+from pydantic import Field, ValidationInfo, field_validator
+
+from nlsolve.contracts.component import Component
+from nlsolve.contracts.continuum.law import ConstitutiveLaw
+from nlsolve.contracts.status import Status
+from nlsolve.flow.momentum import Flow
+from nlsolve.series import Array
+from nlsolve.solving.outcome import Outcome
+from nlsolve.solving.stopping import Budget
+
+LOAD = "load"
+"""What is varied when it is no field of the law: the part of boundary velocities and body forces that acts."""
+
+EASY = 8  # iterations up to which a stage was easy, and the next step is twice as long
+
+
+@dataclass(frozen=True)
+class Stage:
+    """One problem on the way: its law, the part of the load that acts, and the value of what is varied."""
+
+    law: ConstitutiveLaw
+    load: float
+    value: float
+
+
+class Start(Component):
+    """The first state is solved with `by` at each of `values` that is easier than the target, then at the target.
+
+    `by` is a field of the law (larger values are easier) or "load" (smaller ones are). The starting method does it,
+    with a new tangent each iteration; the work is counted apart from the march (columns `start_…`). An adaptive
+    continuation begins with the first of `values`, tries the second next, and goes on in steps of log(`by`), halved
+    where a stage fails and doubled where it was easy. Without values a steady scene is the case's own method's from
+    rest on.
+
+    A perturbation moves the guess that each solve of the case's own method begins with: in a steady scene the state
+    after the continuation (or rest), in a march the state that each increment begins with. Equations stay the same.
+    """
+
+    noun: ClassVar[str] = "start"
+
+    by: str = Field(
+        "index",
+        description="what is varied: a field of the law, as index (from 1) or regularization (from large), or load",
+    )
+    values: tuple[float, ...] = Field((1.0, 0.5, 0.3, 0.2), description="its values on the way, in order")
+    adaptive: bool = Field(False, description="find the values between the first and the target")
+    smallest: float = Field(0.01, gt=0, lt=1, description="adaptive: shortest step, as part of the way in log(by)")
+    iterations: int = Field(25, gt=0, description="adaptive: iterations after which a stage has failed")
+    tolerance: float = Field(1e-10, gt=0, description="relative residual of the first state")
+    perturbation: float = Field(
+        0.0, ge=0, description="ε, size of a random change of the case's own first guesses over that of the velocity"
+    )
+    seed: int = Field(0, ge=0, description="of the perturbation; without one all seeds are one case, that of seed 0")
+
+    @field_validator("seed")
+    @classmethod
+    def _nothing_to_draw(cls, seed: int, info: ValidationInfo) -> int:
+        return seed if info.data.get("perturbation") else 0
+
+    def disturbed(self, flow: Flow, u: Array, increment: int) -> Array:
+        """u + ε ‖V‖₂ g/‖g‖₂ with V the velocities of all nodes and g normal, drawn anew for each increment."""
+        if not self.perturbation:
+            return u
+        g = np.random.default_rng([self.seed, increment]).standard_normal(len(u))
+        return u + self.perturbation * np.linalg.norm(flow.velocity(u)) / np.linalg.norm(g) * g
+
+    def stages(self, law: ConstitutiveLaw) -> list[Stage]:
+        """The stages that `values` name, and the target last. ValueError for what cannot be gone through."""
+        if self.by == LOAD:
+            path = (*self.values, 1.0)
+            if min(path) <= 0.0 or (np.diff(path) <= 0.0).any():
+                raise ValueError(
+                    f"start.values = {list(self.values)}: a load grows to 1: give increasing values between 0 and 1, "
+                    "such as [1e-4, 1e-2]"
+                )
+            return [Stage(law, load, load) for load in path]
+        stages = [Stage(each, 1.0, getattr(each, self.by)) for each in law.continuation(self.by, self.values)]
+        if self.adaptive and not min(stage.value for stage in stages) > 0.0:
+            raise ValueError(
+                f"start.by = {self.by!r}: an adaptive continuation steps in its logarithm, and the law's is "
+                f"{stages[-1].value:g}: choose another field, or adaptive = false"
+            )
+        return stages
+
+    def budget(self, budget: Budget) -> Budget:
+        """What one stage may cost."""
+        return budget.with_(iterations=min(self.iterations, budget.iterations)) if self.adaptive else budget
+
+    def between(self, first: Stage, target: Stage, part: float) -> Stage:
+        """The stage at log-interpolated `by`; part = 0: first, part = 1: target."""
+        if part >= 1.0:
+            return target
+        value = float(first.value * (target.value / first.value) ** part)
+        return (
+            Stage(target.law, value, value)
+            if self.by == LOAD
+            else Stage(target.law.with_(**{self.by: value}), 1.0, value)
+        )
+
+
+def walk(start: Start, law: ConstitutiveLaw, solve: Callable[[Stage, bool], Outcome]) -> tuple[Outcome, Stage]:
+    """Solve stage after stage, each from the state the last one left; the outcome of the last, and which that was.
+
+    solve(stage, last) keeps the state of a stage that converges, and forgets what became of one that does not.
+    """
+    stages = start.stages(law)
+    if start.adaptive and len(stages) > 1:
+        return _adaptive(start, stages, solve)
+    for stage in stages:
+        outcome = solve(stage, stage is stages[-1])
+        if outcome.status is not Status.CONVERGED:
+            break
+    return outcome, stage
+
+
+def _adaptive(start: Start, stages: list[Stage], solve: Callable[[Stage, bool], Outcome]) -> tuple[Outcome, Stage]:
+    """Along log(by), `step` being a part of the whole way."""
+    first, second, target = stages[0], stages[1], stages[-1]
+    step = float(np.log(second.value / first.value) / np.log(target.value / first.value))
+    reached, here = 0.0, first
+    outcome = solve(first, False)
+    while outcome.status is Status.CONVERGED and reached < 1.0:
+        part = min(1.0, reached + step)
+        stage = start.between(first, target, part)
+        trial = solve(stage, stage is target)
+        if trial.status is Status.CONVERGED:
+            outcome, reached, here = trial, part, stage
+            step *= 2.0 if len(trial.steps) - 1 <= EASY else 1.0
+            continue
+        step = 0.5 * (part - reached)
+        if step < start.smallest:
+            detail = (
+                f"the adaptive continuation got from {first.value:g} to {here.value:g}, and from there not even a step "
+                f"of {start.smallest:g} of the way succeeds (start.smallest): {trial.detail}"
+            )
+            return replace(trial, detail=detail), stage
+    return outcome, here

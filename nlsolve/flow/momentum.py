@@ -1,0 +1,234 @@
+"""R(v) = W ρ ((v − v_k)/Δt + (v·∇) v) − S s(B v) − S_θ (λ B_θ v − p) − W f : the discrete balance of momentum.
+
+It holds at the interior nodes; W are the areas of their material in a conservative form, 1 in a strong one. Terms that
+the scene leaves out are absent, not zero. The same formula runs on arrays and on series.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+
+from nlsolve.contracts.continuum.cloud import Cloud
+from nlsolve.contracts.continuum.discretizer import Operators
+from nlsolve.contracts.continuum.law import ConstitutiveLaw, Number, rate_squared, stress, tangent_moduli
+from nlsolve.contracts.problem import Expansion, NonlinearProblem
+from nlsolve.series import Array, Series
+
+
+@dataclass(frozen=True)
+class Inertia:
+    """ρ/Δt [t/(mm³ s)] and the velocity (N, 2) of the same nodes one increment ago [mm/s]."""
+
+    density_over_increment: float
+    previous: Array
+
+
+@dataclass(frozen=True)
+class Convection:
+    """ρ [t/mm³] and the (N, N) matrices of ∂/∂x and ∂/∂y at the nodes."""
+
+    density: float
+    gradient: tuple[Any, Any]
+
+
+class Flow(NonlinearProblem):
+    """R(u) = 0 for u, the velocities (u_0, v_0, u_1, …) of the interior nodes, shape (2F,) [mm/s]; R in [N/mm³], or in
+    [N/mm] when the operators are a conservative form.
+
+    cloud, operators : the nodes and their B, S, B_θ, S_θ.
+    law : s(ε̇) = 2 μ(ε̄²) ε̇.
+    boundary_velocity : prescribed velocities of the boundary nodes, shape (N − F, 2).
+    penalty_modulus : λ [MPa s], one or (L,); the volumetric term is present when the operators have one.
+    pressure : p at the volume points, shape (L,) [MPa], for the iterated penalty.
+    inertia, convection, body_force : present when given; f at the interior nodes, shape (F, 2) [N/mm³].
+    """
+
+    def __init__(
+        self,
+        cloud: Cloud,
+        operators: Operators,
+        law: ConstitutiveLaw,
+        boundary_velocity: Array,
+        penalty_modulus: float | Array = 0.0,
+        pressure: Array | None = None,
+        inertia: Inertia | None = None,
+        convection: Convection | None = None,
+        body_force: Array | None = None,
+    ) -> None:
+        self.cloud, self.operators, self.law = cloud, operators, law
+        self.is_gradient = operators.node_areas is not None and convection is None
+        self._free = node_major(cloud.interior)
+        lifted = np.zeros(2 * len(cloud.nodes))
+        lifted[node_major(cloud.boundary)] = boundary_velocity.ravel()
+        self._lifted = lifted
+        self._strain = operators.strain[:, self._free]
+        self._strain_boundary = operators.strain @ lifted
+        self._force = operators.force
+        self._gradient: Any = None
+        self._dilatation: Any = None
+        self._inertia: Any = None
+        self._carried: _Carried | None = None
+        areas = 1.0 if operators.node_areas is None else np.repeat(operators.node_areas, 2)
+        constant = np.zeros(len(self._free))
+        self._modulus: Array | None = None
+        self._pressure: Array | float = 0.0 if pressure is None else pressure
+        if operators.dilatation is not None and np.max(penalty_modulus) > 0.0:
+            self._modulus = np.broadcast_to(penalty_modulus, operators.dilatation.shape[0])
+            self._gradient = -operators.pressure_force @ sp.diags_array(self._modulus)
+            self._dilatation = operators.dilatation[:, self._free]
+            constant += self._gradient @ (operators.dilatation @ lifted)
+            if pressure is not None:
+                constant += operators.pressure_force @ pressure
+        if inertia is not None:
+            self._inertia = areas * np.full(len(self._free), inertia.density_over_increment)
+            constant -= self._inertia * inertia.previous[cloud.interior].ravel()
+        if convection is not None:
+            self._carried = _Carried(convection, cloud, areas * np.ones(len(self._free)), lifted)
+        if body_force is not None:
+            constant -= areas * body_force.ravel()
+        self._constant = constant
+
+    def residual(self, u: Array) -> Array:
+        """R(u)."""
+        return self._balance(u)
+
+    def expand(self, u: Array) -> Expansion:
+        """The same balance, run on a series that begins with u."""
+        path = Series(u)
+        return Expansion(path, self._balance(path))
+
+    def _balance(self, u: Number) -> Number:
+        balance = self._constant - self._force @ stress(self.law, self._strain_rate(u)).reshape(-1)
+        if self._gradient is not None:
+            balance = balance + self._gradient @ (self._dilatation @ u)
+        if self._inertia is not None:
+            balance = balance + self._inertia * u
+        if self._carried is not None:
+            balance = balance + self._carried.force(u)
+        return balance
+
+    def _strain_rate(self, u: Number) -> Number:
+        return (self._strain @ u + self._strain_boundary).reshape(3, -1)
+
+    def jacobian(self, u: Array) -> Any:
+        """J = W ρ (1/Δt + ∂(v·∇ v)/∂v) − S C B − S_θ λ B_θ with the pointwise moduli C (3, 3, M) of the law."""
+        carried = None if self._carried is None else self._carried.tangent(u)
+        return self._linearized(tangent_moduli(self.law, self._strain_rate(u)), carried)
+
+    def secant(self, u: Array) -> Any:
+        """A = W ρ (1/Δt + v·∇) − S 2μ B − S_θ λ B_θ, viscosity and carrying velocity those of u (Picard, Oseen)."""
+        carried = None if self._carried is None else self._carried.secant(u)
+        return self._linearized(secant_moduli(self.law, self._strain_rate(u)), carried)
+
+    def _linearized(self, moduli: Array, carried: Any) -> Any:
+        """W ρ/Δt + carried − S C B − S_θ λ B_θ with pointwise moduli C (3, 3, M)."""
+        points = moduli.shape[2]
+        # C as a sparse matrix with three entries a row: row a M + m holds columns m, M + m, 2 M + m.
+        columns = np.arange(points)[None, :, None] + points * np.arange(3)[None, None, :]
+        pointwise = sp.csr_array(
+            (
+                np.ascontiguousarray(moduli.transpose(0, 2, 1)).ravel(),
+                np.broadcast_to(columns, (3, points, 3)).ravel(),
+                np.arange(0, 9 * points + 1, 3),
+            ),
+            shape=(3 * points, 3 * points),
+        )
+        jacobian = -(self._force @ (pointwise @ self._strain))
+        if self._gradient is not None:
+            jacobian = jacobian + self._gradient @ self._dilatation
+        if self._inertia is not None:
+            jacobian = jacobian + sp.diags_array(self._inertia)
+        return jacobian if carried is None else jacobian + carried
+
+    def scale(self, u: Array) -> float:
+        """‖|S| |s| + |S_θ λ| |B_θ v| + W ρ |v/Δt + v·∇ v| + |constant|‖₂: the size of the forces that cancel in R."""
+        terms = abs(self._force) @ np.abs(stress(self.law, self._strain_rate(u))).ravel() + np.abs(self._constant)
+        if self._gradient is not None:
+            terms += abs(self._gradient) @ np.abs(self._dilatation @ u)
+        if self._inertia is not None:
+            terms += self._inertia * np.abs(u)
+        if self._carried is not None:
+            terms += np.abs(self._carried.force(u))
+        return float(np.linalg.norm(terms)) or 1.0
+
+    def blame(self, u: Array, residual: Array) -> Mapping[str, float]:
+        """The node where ‖R‖ is largest, the strain rate at the strain point nearest to it, and the share of the strain
+        points where ε̄ < ε₀, whose viscosity is the regularization's own.
+        """
+        forces = np.nan_to_num(np.linalg.norm(residual.reshape(-1, 2), axis=1), nan=np.inf)
+        node = int(self.cloud.interior[forces.argmax()])
+        rate = np.sqrt(rate_squared(self._strain_rate(u)))
+        nearest = np.linalg.norm(self.operators.strain_points - self.cloud.nodes[node], axis=1).argmin()
+        floor = getattr(self.law, "regularization", 0.0)
+        return {
+            "blame_x": float(self.cloud.nodes[node, 0]),
+            "blame_y": float(self.cloud.nodes[node, 1]),
+            "blame_rate": float(rate[nearest]),
+            "blame_regularized": float(np.mean(rate < floor)),
+        }
+
+    def velocity(self, u: Array) -> Array:
+        """Velocities of all nodes, boundary included, shape (N, 2) [mm/s]."""
+        full = self._lifted.copy()
+        full[self._free] = u
+        return full.reshape(-1, 2)
+
+    def unknowns(self, velocity: Array) -> Array:
+        """u from the velocities (N, 2) of all nodes."""
+        return velocity[self.cloud.interior].ravel()
+
+    def stress_at_points(self, u: Array) -> Array:
+        """s at the evaluation points, shape (3, M) [MPa]."""
+        return stress(self.law, self._strain_rate(u))
+
+    def dilatation_rate(self, u: Array) -> Array | None:
+        """tr ε̇ = div v at the volume points, shape (L,) [1/s]; None without a volumetric term."""
+        return None if self._modulus is None else self.operators.dilatation @ self.velocity(u).ravel()
+
+    def pressure(self, u: Array) -> Array | None:
+        """p − λ tr ε̇ at the volume points, shape (L,) [MPa], the next p of an iterated penalty; None without one."""
+        rate = self.dilatation_rate(u)
+        return None if rate is None or self._modulus is None else self._pressure - self._modulus * rate
+
+
+class _Carried:
+    """W ρ (v·∇) v at the interior nodes, (2F,), of interior velocities u (2F,), and its tangent."""
+
+    def __init__(self, convection: Convection, cloud: Cloud, areas: Array, lifted: Array) -> None:
+        inside, free = cloud.interior, node_major(cloud.interior)
+        self._terms = []
+        for axis, derivative in enumerate(convection.gradient):
+            # Rows node-major: ∂/∂x (or ∂/∂y) of u_i, then of v_i; beside it u_i (or v_i), the speed that carries both.
+            rows = sp.kron(sp.csr_array(derivative)[inside], sp.eye_array(2), format="csr")
+            speed = sp.kron(
+                sp.eye_array(len(inside)), sp.csr_array([[1.0 - axis, axis], [1.0 - axis, axis]]), format="csr"
+            )
+            weight = sp.diags_array(convection.density * areas)
+            self._terms.append((weight @ rows[:, free], weight @ (rows @ lifted), speed))
+
+    def force(self, u: Number) -> Number:
+        (x, x_0, speed_x), (y, y_0, speed_y) = self._terms
+        return (speed_x @ u) * (x @ u + x_0) + (speed_y @ u) * (y @ u + y_0)
+
+    def secant(self, u: Array) -> Any:
+        return sum(sp.diags_array(speed @ u) @ slope for slope, _, speed in self._terms)
+
+    def tangent(self, u: Array) -> Any:
+        return self.secant(u) + sum(
+            sp.diags_array(slope @ u + slope_0) @ speed for slope, slope_0, speed in self._terms
+        )
+
+
+def secant_moduli(law: ConstitutiveLaw, strain_rate: Array) -> Array:
+    """C = 2 μ I, shape (3, 3, M), so that s = C ε̇."""
+    return 2.0 * np.eye(3)[:, :, None] * law.viscosity(rate_squared(strain_rate))
+
+
+def node_major(nodes: Any) -> Any:
+    """Indices 2 i, 2 i + 1 of the velocity components of `nodes`."""
+    return np.stack([2 * nodes, 2 * nodes + 1], axis=1).ravel()

@@ -1,0 +1,193 @@
+"""dx/dt = V(x, t) : where the nodes go, and where the material goes when they stay or go elsewhere.
+
+N nodes. Boundary nodes and markers follow the exact motion of their wall; everything else is integrated.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from nlsolve.contracts.continuum.cloud import Cloud
+from nlsolve.contracts.continuum.discretizer import Discretizer, Operators
+from nlsolve.contracts.continuum.scene import Scene
+from nlsolve.contracts.status import SolveError, Status
+from nlsolve.series import Array
+
+LEAST_QUALITY = 0.05
+"""Distance to the nearest node, over that at t = 0, below which a moving cloud is given up."""
+
+LARGEST_SHIFT = 0.1
+"""A node is shifted by no more than this part of its own spacing in one increment."""
+
+NEIGHBOURS = 8
+
+HALFWAY: dict[int, tuple[float, ...]] = {
+    1: (1.0,),
+    2: (1 / 2, 1 / 2),
+    3: (3 / 8, 6 / 8, -1 / 8),
+    4: (5 / 16, 15 / 16, -5 / 16, 1 / 16),
+}
+"""Weights of V at t + Δt, t, t − Δt, t − 2Δt in the polynomial through them, at t + Δt/2."""
+
+LOST = 1.5
+"""A marker farther than this many spacings from every node, or outside the rectangle around all, has left them."""
+
+
+def halfway(velocities: Sequence[Array]) -> Array:
+    """V(t + Δt/2), shape (N, 2), from V at t + Δt, t, t − Δt, t − 2Δt, as many as are known (one to four)."""
+    return np.tensordot(HALFWAY[len(velocities)], np.stack(velocities), 1)
+
+
+NodalField = Sequence[tuple[Array, Array]]
+"""Terms of a velocity field, each given by nodes (N, 2) and the velocities (N, 2) there."""
+
+
+def runge_kutta(
+    places: Array,
+    start: NodalField,
+    middle: NodalField,
+    end: NodalField,
+    increment: float,
+    at: Callable[[NodalField, Array], Array],
+) -> Array:
+    """x(t + Δt) of places (T, 2) by the classical method; `at(V, x)` takes a nodal field to places x (T, 2)."""
+    first = at(start, places)
+    second = at(middle, places + 0.5 * increment * first)
+    third = at(middle, places + 0.5 * increment * second)
+    fourth = at(end, places + increment * third)
+    return places + increment / 6.0 * (first + 2.0 * second + 2.0 * third + fourth)
+
+
+class Markers:
+    """Material points that start at the nodes, carried through the velocities of fixed or shifted nodes.
+
+    Between the increments velocities are interpolated in time: through up to four increments at fixed nodes, so that
+    the places are of fourth order in Δt once three have passed, linearly at moving ones, second order as their motion.
+    """
+
+    def __init__(self, scene: Scene, discretizer: Discretizer, initial: Cloud, velocity: Array) -> None:
+        self.scene, self.discretizer, self.initial = scene, discretizer, initial
+        self.places = initial.nodes.copy()  # (N, 2) [mm]; NaN once a marker has left the cloud
+        self._known = [(initial.nodes, velocity)]
+
+    def advance(self, cloud: Cloud, velocity: Array, time: float) -> None:
+        """Carry the markers over the increment that ends at `time` with the `cloud` and its `velocity` (N, 2)."""
+        self._known = [(cloud.nodes, velocity), *self._known][: max(HALFWAY)]
+        end, start = self._known[:2]
+        middle = [(nodes, 0.5 * velocity) for nodes, velocity in (end, start)]
+        if end[0] is start[0]:
+            middle = [(cloud.nodes, halfway([velocity for _, velocity in self._known]))]
+        inside = self.initial.interior
+        followed = inside[np.isfinite(self.places[inside, 0])]
+        moved = runge_kutta(self.places[followed], [start], middle, [end], self.scene.increment, self._velocity_at)
+        distance, nearest = cKDTree(cloud.nodes).query(moved)
+        lost = (distance > LOST * cloud.nearest_distance[nearest]) | (moved != within(cloud.nodes, moved)).any(axis=1)
+        moved[lost] = np.nan
+        self.places[followed] = moved
+        self.places[self.initial.boundary] = self.scene.boundary_position(self.initial, time)
+
+    def _velocity_at(self, field: NodalField, places: Array) -> Array:
+        values = self.discretizer.values
+        return np.sum([values(nodes, within(nodes, places)) @ velocity for nodes, velocity in field], axis=0)
+
+
+def within(nodes: Array, places: Array) -> Array:
+    """Places (T, 2) outside the rectangle around the nodes, brought back to its edge."""
+    return np.clip(places, nodes.min(axis=0), nodes.max(axis=0))
+
+
+class Neighbourhoods:
+    """Which nodes j of a cloud are the nearest to each node i, and the distances between them."""
+
+    def __init__(self, cloud: Cloud) -> None:
+        distance, near = cKDTree(cloud.nodes).query(cloud.nodes, min(NEIGHBOURS + 1, len(cloud.nodes)))
+        self.distance, self.near = distance[:, 1:], near[:, 1:]
+
+    def parted(self, nodes: Array) -> float:
+        """max_ij | |x_i − x_j| − d_ij | / min_j d_ij of nodes (N, 2) that were d_ij apart: 0 for a rigid motion."""
+        distance = np.linalg.norm(nodes[:, None] - nodes[self.near], axis=2)
+        return float((np.abs(distance - self.distance) / self.distance[:, :1]).max())
+
+
+class MovingNodes:
+    """Nodes that move with the material, how evenly spaced they stay, and whose neighbours they are.
+
+    quality : smallest distance to the nearest node over that of the same node at t = 0, so far.
+    searches : how often neighbours were found, so far.
+
+    Shifted nodes are not material points any more; markers are.
+    """
+
+    def __init__(self, scene: Scene, discretizer: Discretizer, initial: Cloud) -> None:
+        self.scene, self.discretizer, self.initial = scene, discretizer, initial
+        self.quality = 1.0
+        self.searches = 0
+        self._operators: Operators
+        self._found: Neighbourhoods | None = None
+
+    def operators(self, cloud: Cloud, volumetric: bool) -> Operators:
+        """Of the moved cloud, with the neighbours found last while none has parted by more than the scene's `skin`
+        (lists of Verlet 1967) and while the discretizer can keep them.
+        """
+        operators = None
+        if self._found is not None and self._found.parted(cloud.nodes) <= self.scene.skin:
+            operators = self.discretizer.moved(self._operators, cloud)
+        if operators is None:
+            operators = self.discretizer.operators(cloud, volumetric)
+            keeps = self.scene.skin and operators.neighbours is not None
+            self._found = Neighbourhoods(cloud) if keeps else None
+            self.searches += 1
+        self._operators = operators
+        return operators
+
+    def move(self, cloud: Cloud, velocity: Array, before: Array | None, time: float) -> tuple[Cloud, Any]:
+        """x_{k+1} = x_k + Δt (3/2 v_k − 1/2 v_{k−1}) (Adams-Bashforth), then shifted if the scene asks for it.
+
+        Returns the cloud at `time` and, when it was shifted, the matrix (N, N) by which nodal values change with it:
+        values there less values here, so that what is hardly shifted is hardly smoothed.
+        Raises SolveError (bad cloud) when two nodes have come too close.
+        """
+        step = velocity if before is None else 1.5 * velocity - 0.5 * before
+        nodes = cloud.nodes + self.scene.increment * step
+        nodes[self.initial.boundary] = self.scene.boundary_position(self.initial, time)
+        moved, carry = cloud.moved_to(nodes), None
+        if self.scene.shifting:
+            moved = moved.moved_to(nodes + shifts(moved, self.initial.nearest_distance, self.scene.shifting))
+            values = self.discretizer.values
+            carry = values(nodes, moved.nodes) - values(nodes, nodes)
+        self._watch(moved, time)
+        return moved, carry
+
+    def _watch(self, cloud: Cloud, time: float) -> None:
+        ratio = cloud.nearest_distance / self.initial.nearest_distance
+        worst = int(ratio.argmin())
+        self.quality = min(self.quality, float(ratio[worst]))
+        if self.quality < LEAST_QUALITY:
+            x, y = cloud.nodes[worst]
+            raise SolveError(
+                Status.BAD_CLOUD,
+                f"at t = {time:.6g} s the node at ({x:.6g}, {y:.6g}) is {self.quality:.2g} times as far from its "
+                'neighbour as at t = 0: raise shifting, shorten the increment, or use motion_of_nodes = "fixed" with '
+                "markers = true",
+            )
+
+
+def shifts(cloud: Cloud, spacing: Array, fraction: float) -> Array:
+    """δx_i = fraction · Σ_j (h_ij − |x_i − x_j|)₊ e_ij, shape (N, 2) [mm]; zero on the boundary.
+
+    e_ij points from j to i, h_ij is the mean of the spacings (N,) wanted at the two: nodes that come nearer than at
+    t = 0 push each other away, others stay. Repulsion of Persson & Strang (2004), used as particle shifting (Lind, Xu,
+    Stansby & Rogers 2012).
+    """
+    found = Neighbourhoods(cloud)
+    distance, near = found.distance, found.near
+    push = np.maximum(0.5 * (spacing[:, None] + spacing[near]) - distance, 0.0) / distance
+    shift = fraction * (push[..., None] * (cloud.nodes[:, None] - cloud.nodes[near])).sum(axis=1)
+    shift[cloud.boundary] = 0.0
+    most = LARGEST_SHIFT * spacing
+    length = np.maximum(np.linalg.norm(shift, axis=1), np.finfo(float).tiny)
+    return shift * np.minimum(1.0, most / length)[:, None]

@@ -1,0 +1,150 @@
+"""What is measured on a solved flow: its error, the reaction of the moving wall, its fields at the nodes."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+
+from nlsolve.contracts.continuum.cloud import Cloud, Indices
+from nlsolve.contracts.continuum.discretizer import Discretizer
+from nlsolve.contracts.continuum.law import CONTRACTION, rate_squared
+from nlsolve.contracts.continuum.scene import Scene
+from nlsolve.contracts.linear_solver import LinearSolver
+from nlsolve.contracts.status import SolveError, Status
+from nlsolve.flow.momentum import Flow
+from nlsolve.series import Array
+
+
+def velocity_error(scene: Scene, flow: Flow, velocity: Array, time: float) -> dict[str, float]:
+    """‖v − v_exact‖₂ / ‖v_exact‖₂ over all nodes and over those inside; empty where the scene has no exact solution."""
+    exact = scene.exact(flow.law, flow.cloud.nodes, time)
+    if exact is None:
+        return {}
+    inside = flow.cloud.interior
+    return {
+        "velocity_error": _relative(velocity, exact.velocity),
+        "velocity_error_inside": _relative(velocity[inside], exact.velocity[inside]),
+    }
+
+
+def _relative(value: Array, exact: Array) -> float:
+    return float(np.linalg.norm(value - exact) / np.linalg.norm(exact))
+
+
+def discretization_error(other: Flow, velocity: Array, linear: LinearSolver) -> float:
+    """‖δ‖₂/‖v‖₂ with J′(v) δ = −R′(v), over the interior nodes, for the `velocity` (N, 2) of a flow that `other`
+    discretises otherwise, by R′: how far a solved velocity is from that of another discretisation of the same nodes.
+
+    Where the errors of both have little in common, δ is the larger of the two in the main. One Newton step tells, as in
+    defect correction (Stetter 1978; Skeel 1986): R′ is never solved.
+
+    Raises SolveError when `other` has no finite residual there or a singular tangent.
+    """
+    u = other.unknowns(velocity)
+    residual = other.residual(u)
+    if not np.isfinite(residual).all():
+        raise SolveError(Status.NON_FINITE, "the residual of the other discretisation is not finite")
+    change = linear.factorize(other.jacobian(u)).solve(residual)
+    return float(np.linalg.norm(change) / np.linalg.norm(u))
+
+
+def divergence(flow: Flow, velocity: Array) -> float:
+    """‖div v‖/‖ε̄‖, root mean squares over the volume points and the strain points; NaN without a volumetric term."""
+    dilatation = flow.dilatation_rate(flow.unknowns(velocity))
+    if dilatation is None:
+        return float("nan")
+    squared = rate_squared((flow.operators.strain @ velocity.ravel()).reshape(3, -1))
+    return float(np.sqrt(np.mean(dilatation**2) / np.mean(squared)))
+
+
+def wall_reaction(scene: Scene, discretizer: Discretizer, flow: Flow, velocity: Array, time: float) -> dict[str, float]:
+    """Force, and torque about the origin, of the moving wall on the material, with errors; empty without a contour."""
+    contour = scene.contour()
+    if contour is None:
+        return {}
+    u = flow.unknowns(velocity)
+    if flow.operators.strain_areas is None:
+        force_x, force_y, torque = _through(contour, discretizer, flow, u)
+    else:
+        force_x, force_y, torque = _at_wall(_inside(contour, flow.cloud), flow, u)
+    reaction = {"force_x": force_x, "force_y": force_y, "torque": torque}
+    exact = scene.exact(flow.law, flow.cloud.nodes, time)
+    if exact is not None and "torque" in exact.quantities:
+        reaction["torque_error"] = abs(torque / exact.quantities["torque"] - 1.0)
+    if exact is not None and "force_x" in exact.quantities:
+        exact_force = np.array([exact.quantities["force_x"], exact.quantities["force_y"]])
+        reaction["force_error"] = _relative(np.array([force_x, force_y]), exact_force)
+    return reaction
+
+
+def _through(contour: Array, discretizer: Discretizer, flow: Flow, u: Array) -> tuple[float, float, float]:
+    """−∮ σ n ds and −∮ x × σ n ds over the contour (C, 2), where the fields are smooth.
+
+    The quasi-static balance carries both unchanged from the wall to any contour around it.
+    """
+    edges = np.roll(contour, -1, axis=0) - contour
+    middles = contour + 0.5 * edges
+    n_ds = np.stack([edges[:, 1], -edges[:, 0]], axis=1)  # outward, the contour running counter-clockwise
+    values = discretizer.values(flow.operators.strain_points, middles)
+    xx, yy, xy = (values @ component for component in flow.stress_at_points(u))
+    pressure = flow.pressure(u)
+    if pressure is not None and flow.operators.volume_points is not None:
+        volumetric = discretizer.values(flow.operators.volume_points, middles) @ pressure
+        xx, yy = xx - volumetric, yy - volumetric
+    traction = np.stack([xx * n_ds[:, 0] + xy * n_ds[:, 1], xy * n_ds[:, 0] + yy * n_ds[:, 1]], axis=1)
+    force_x, force_y = -traction.sum(axis=0)
+    torque = -float((middles[:, 0] * traction[:, 1] - middles[:, 1] * traction[:, 0]).sum())
+    return float(force_x), float(force_y), torque
+
+
+def _at_wall(wall: Indices, flow: Flow, u: Array) -> tuple[float, float, float]:
+    """Σ A σ : B w, the virtual power of a conservative form, for w a shift along x, along y, and a turn of the wall's
+    nodes, with all others at rest: exactly the reactions that balance the forces inside.
+    """
+    operators = flow.operators
+    assert operators.strain_areas is not None
+    x, y = flow.cloud.nodes[wall].T
+    w = np.zeros((3, len(flow.cloud.nodes), 2))
+    w[0, wall, 0] = w[1, wall, 1] = 1.0
+    w[2, wall, 0], w[2, wall, 1] = -y, x
+    shifts = w.reshape(3, -1).T
+    weighed = (CONTRACTION[:, None] * operators.strain_areas * flow.stress_at_points(u)).ravel()
+    power = weighed @ (operators.strain @ shifts)
+    pressure = flow.pressure(u)
+    if pressure is not None and operators.volume_areas is not None:
+        power = power - (operators.volume_areas * pressure) @ (operators.dilatation @ shifts)
+    return float(power[0]), float(power[1]), float(power[2])
+
+
+def _inside(contour: Array, cloud: Cloud) -> Indices:
+    """Boundary nodes within a closed polygon (C, 2): a ray to the right meets it an odd number of times."""
+    nodes = cloud.boundary
+    x, y = cloud.nodes[nodes].T[:, :, None]
+    (ax, ay), (bx, by) = contour.T, np.roll(contour, -1, axis=0).T
+    with np.errstate(divide="ignore", invalid="ignore"):  # level edges are crossed by no level ray
+        meets = ((ay > y) != (by > y)) & (x < ax + (y - ay) / (by - ay) * (bx - ax))
+    return nodes[meets.sum(axis=1) % 2 == 1]
+
+
+def nodal_fields(
+    scene: Scene, discretizer: Discretizer, flow: Flow, velocity: Array, initial: Cloud, time: float
+) -> pd.DataFrame:
+    """A row a node: place at t = 0 and now, velocity, strain rates, exact velocity (columns of `FIELDS`)."""
+    nodes = flow.cloud.nodes
+    strain_rate = (flow.operators.strain @ velocity.ravel()).reshape(3, -1)
+    to_nodes = discretizer.values(flow.operators.strain_points, nodes)
+    exx, eyy, exy = at_nodes = np.stack([to_nodes @ component for component in strain_rate])
+    exact = scene.exact(flow.law, nodes, time)
+    exact_velocity = np.full_like(nodes, np.nan) if exact is None else exact.velocity
+    boundary = np.full(len(nodes), "", dtype=object)
+    for name, group in initial.boundaries.items():
+        boundary[group] = name
+    columns: dict[str, object] = {"time": time, "node": np.arange(len(nodes)), "boundary": boundary}
+    for names, pair in (
+        (("x0", "y0"), initial.nodes),
+        (("x", "y"), nodes),
+        (("u", "v"), velocity),
+        (("exact_u", "exact_v"), exact_velocity),
+    ):
+        columns |= dict(zip(names, pair.T, strict=True))
+    return pd.DataFrame(columns | {"exx": exx, "eyy": eyy, "exy": exy, "rate": np.sqrt(rate_squared(at_nodes))})

@@ -1,0 +1,56 @@
+"""The plugin authors' door: every contract and every helper that a plugin may import."""
+
+from __future__ import annotations
+
+from nlsolve.contracts.component import Component
+from nlsolve.contracts.continuum.cloud import Cloud, Exact
+from nlsolve.contracts.continuum.discretizer import Discretizer, Operators
+from nlsolve.contracts.continuum.law import ConstitutiveLaw, PowerForm, local_index, stress
+from nlsolve.contracts.continuum.scene import Scene
+from nlsolve.contracts.globalization import Globalization, Search
+from nlsolve.contracts.linear_solver import Factors, LinearSolver
+from nlsolve.contracts.nonlinear_solver import KeptTangent, NonlinearSolver, Step
+from nlsolve.contracts.predictor import Predictor
+from nlsolve.contracts.problem import Expansion, NonlinearProblem
+from nlsolve.contracts.refresh import Evidence, RefreshRule
+from nlsolve.contracts.status import SolveError, Status
+from nlsolve.contracts.system import System
+from nlsolve.registry.hookspecs import hookimpl
+from nlsolve.registry.nested import Globalized
+from nlsolve.series import Series, upright
+from nlsolve.solving.anderson_mixing import Mixing
+from nlsolve.solving.cached_jacobian import AssembledOnce
+
+__all__ = [
+    "AssembledOnce",
+    "Cloud",
+    "Component",
+    "ConstitutiveLaw",
+    "Discretizer",
+    "Evidence",
+    "Exact",
+    "Expansion",
+    "Factors",
+    "Globalization",
+    "Globalized",
+    "KeptTangent",
+    "LinearSolver",
+    "Mixing",
+    "NonlinearProblem",
+    "NonlinearSolver",
+    "Operators",
+    "PowerForm",
+    "Predictor",
+    "RefreshRule",
+    "Scene",
+    "Search",
+    "Series",
+    "SolveError",
+    "Status",
+    "Step",
+    "System",
+    "hookimpl",
+    "local_index",
+    "stress",
+    "upright",
+]

@@ -1,0 +1,32 @@
+"""Components inside components: `solver = { kind = "newton", globalization = { kind = "cubic" } }`.
+
+A field of type `Globalized` takes any installed globalisation, a stranger's too: its kind is looked up when a value
+arrives, for plugins are still being imported when the field is declared. The default of such a field is a table.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+from pydantic import BeforeValidator, SerializeAsAny
+
+from nlsolve.contracts.component import Component
+from nlsolve.contracts.globalization import Globalization
+from nlsolve.registry.registry import load_registry
+
+
+def installed(contract: type[Component]) -> BeforeValidator:
+    """A table with a kind -> the installed component of this contract; what is wrong is told in its own place."""
+
+    def component(value: Any) -> Any:
+        registry = load_registry()
+        known = registry.known(contract.noun, value)
+        return (
+            registry.classes(contract.noun)[known["kind"]].model_validate(known) if isinstance(known, dict) else known
+        )
+
+    return BeforeValidator(component)
+
+
+Globalized = Annotated[SerializeAsAny[Globalization], installed(Globalization)]
+"""The type of a field that holds a globalisation."""

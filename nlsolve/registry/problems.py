@@ -1,0 +1,183 @@
+"""What is wrong with a study, in sentences: file, line, dotted place, offending value, what is expected instead."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from difflib import get_close_matches
+from typing import Any, get_args
+
+from pydantic import BaseModel, ValidationError
+
+from nlsolve.contracts.component import Component
+from nlsolve.registry.registry import CONTRACTS, load_registry
+from nlsolve.registry.toml_lines import Place, nearest_line
+
+LONGEST_VALUE = 60
+"""Characters of an offending value that are worth repeating."""
+
+ABSENT = object()
+"""Stands for a value that is not there, or not worth repeating."""
+
+
+class StudyError(ValueError):
+    """A study that cannot be run as it is written. The message has one sentence, on its own line, for every problem."""
+
+    def __init__(self, *problems: str) -> None:
+        super().__init__("\n".join(problems))
+        self.problems = problems
+
+
+@dataclass(frozen=True)
+class Problem:
+    """One thing that is wrong: where in the document, what stands there, and what was expected."""
+
+    place: Place
+    value: Any
+    expected: str
+
+    def sentence(self, source: Source) -> str:
+        """The problem for people, beginning with the place to look at."""
+        text = repr(self.value)
+        shown = f" = {text}" if self.value is not ABSENT and len(text) <= LONGEST_VALUE else ""
+        return f"{source.of(self.place)}: {dotted(self.place)}{shown}: {self.expected}"
+
+
+@dataclass(frozen=True)
+class Source:
+    """Where the parts of a document were written.
+
+    file : name of the study file, or what stands for it.
+    lines : line of every place in it.
+    aliases : dotted names that were last set somewhere else (a sweep, [quick], --set), and where that is.
+    """
+
+    file: str
+    lines: dict[Place, int] = field(default_factory=dict)
+    aliases: Mapping[str, str] = field(default_factory=dict)
+
+    def at(self, place: Place) -> str:
+        """File and line of a place in the document."""
+        line = nearest_line(self.lines, place)
+        return self.file if line is None else f"{self.file}, line {line}"
+
+    def of(self, place: Place) -> str:
+        """Where the value now standing at a place was written."""
+        name = dotted(place)
+        for alias in sorted(self.aliases, key=len, reverse=True):
+            if name == alias or name.startswith(f"{alias}."):
+                return self.aliases[alias]
+        inside = [where for alias, where in self.aliases.items() if alias.startswith(f"{name}.")]
+        return inside[0] if inside and place not in self.lines else self.at(place)
+
+
+def dotted(place: Place) -> str:
+    """scene.nodes.spacing, table[0].rows"""
+    name = ""
+    for part in place:
+        name += f"[{part}]" if isinstance(part, int) else f".{part}" if name else part
+    return name
+
+
+def did_you_mean(name: str, names: Iterable[str]) -> str:
+    """A question with the nearest valid name, or else the list of valid names."""
+    names = list(names)
+    nearest = get_close_matches(name, names, n=1)
+    return f"did you mean {nearest[0]!r}?" if nearest else f"there are {', '.join(map(repr, names)) or 'none'}"
+
+
+def problems_in(error: ValidationError, model: type[BaseModel], document: Any) -> list[Problem]:
+    """The problems pydantic found in a document, told in the document's own places; one for each place."""
+    found: dict[Place, Problem] = {}
+    for detail in error.errors(include_url=False):
+        problem = _problem(detail, model, document)
+        earlier = found.get(problem.place)
+        if earlier is None:
+            found[problem.place] = problem
+        elif problem.expected not in earlier.expected:  # the members of a union complain one by one
+            both = f"{earlier.expected} or {problem.expected}"
+            found[problem.place] = Problem(problem.place, problem.value, both)
+    return list(found.values())
+
+
+def _problem(detail: Mapping[str, Any], model: type[BaseModel], document: Any) -> Problem:
+    kind, value, context = detail["type"], detail["input"], detail.get("ctx", {})
+    place = _place_in(document, detail["loc"], missing=kind == "missing")
+    if kind == "extra_forbidden":
+        names = [name for name in _fields_at(model, place[:-1], document) if name != place[-1]]
+        return Problem(place, value, f"no such field; {did_you_mean(str(place[-1]), names)}")
+    if kind == "missing":
+        return Problem(place, ABSENT, "required, and missing")
+    if kind == "kind_missing":
+        return Problem((*place, "kind"), ABSENT, detail["msg"])
+    if kind == "kind_unknown":
+        return Problem((*place, "kind"), value["kind"], detail["msg"])
+    if kind == "union_tag_not_found":
+        return Problem((*place, "kind"), ABSENT, "required, and missing")
+    if kind == "union_tag_invalid":
+        return Problem((*place, "kind"), context["tag"], _choice(context["tag"], context["expected_tags"]))
+    if kind == "literal_error":
+        return Problem(place, value, _choice(value, context["expected"]))
+    message = detail["msg"].removeprefix("Value error, ").removeprefix("Input ")
+    return Problem(place, value, message)
+
+
+def _choice(value: object, expected: str) -> str:
+    names = [part.strip(" '") for part in expected.replace(" or ", ", ").split(",")]
+    guess = get_close_matches(str(value), names, n=1)
+    return f"should be {expected}" + (f"; did you mean {guess[0]!r}?" if guess else "")
+
+
+def _place_in(document: Any, loc: Place, missing: bool) -> Place:
+    """The part of pydantic's location that is in the document: without tags of unions and names of types."""
+    place: list[str | int] = []
+    for depth, part in enumerate(loc):
+        if _holds(document, part):
+            document = document[part]
+        elif not (missing and depth == len(loc) - 1):
+            continue
+        place.append(part)
+    return tuple(place)
+
+
+def _holds(document: Any, part: str | int) -> bool:
+    if isinstance(document, list | tuple):
+        return isinstance(part, int) and part < len(document)
+    return isinstance(document, Mapping) and part in document
+
+
+def _fields_at(model: type[BaseModel], place: Place, document: Any) -> list[str]:
+    """The fields of the model that is responsible for a place in the document."""
+    candidates = [model]
+    for part in place:
+        if isinstance(part, str):
+            info = _chosen(candidates, document).model_fields[part]
+            candidates = _models_in(info.annotation)
+        document = document[part]
+    return list(_chosen(candidates, document).model_fields)
+
+
+def _chosen(candidates: list[type[BaseModel]], document: Any) -> type[BaseModel]:
+    """Of several models, the one whose `kind` the document names."""
+    for candidate in candidates:
+        info = candidate.model_fields.get("kind")
+        if (
+            info is not None
+            and isinstance(document, Mapping)
+            and document.get("kind", info.default) in get_args(info.annotation)
+        ):
+            return candidate
+    return candidates[0]
+
+
+def _models_in(annotation: Any) -> list[type[BaseModel]]:
+    """The models mentioned in a type: Annotated[A | B, …], list[A], …; of a contract, those that are installed."""
+    contracts = itertools.chain(*CONTRACTS.values())
+    if isinstance(annotation, type) and issubclass(annotation, Component) and annotation in contracts:
+        return list(load_registry().classes(annotation.noun).values())
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        return [annotation]
+    inner = getattr(annotation, "__value__", None)
+    parts = get_args(annotation) if inner is None else (inner,)
+    return [model for part in parts for model in _models_in(part)]

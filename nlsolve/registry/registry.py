@@ -1,0 +1,222 @@
+"""What is installed: the component classes that plugins offer, by noun and kind.
+
+A plugin that cannot be imported or registered takes nobody with it: it becomes a row with a reason. A kind that is
+offered twice belongs to nobody until one of the two packages is removed.
+"""
+
+from __future__ import annotations
+
+import inspect
+import itertools
+from collections.abc import Mapping
+from dataclasses import dataclass
+from difflib import get_close_matches
+from functools import cache
+from importlib.metadata import EntryPoint, entry_points
+from typing import Annotated, Any, Union, get_args
+
+import pluggy
+from pydantic import BeforeValidator, Field
+from pydantic.fields import FieldInfo
+from pydantic_core import PydanticCustomError, to_jsonable_python
+
+from nlsolve.contracts.component import Component
+from nlsolve.contracts.continuum.discretizer import Discretizer
+from nlsolve.contracts.continuum.law import ConstitutiveLaw
+from nlsolve.contracts.continuum.scene import Scene
+from nlsolve.contracts.globalization import Globalization
+from nlsolve.contracts.linear_solver import LinearSolver
+from nlsolve.contracts.nonlinear_solver import NonlinearSolver
+from nlsolve.contracts.predictor import Predictor
+from nlsolve.contracts.refresh import RefreshRule
+from nlsolve.contracts.system import System
+from nlsolve.registry import hookspecs
+
+CONTRACTS: dict[str, tuple[type[Component], ...]] = {
+    contracts[0].noun: contracts
+    for contracts in (
+        (Scene, System),
+        (ConstitutiveLaw,),
+        (Discretizer,),
+        (LinearSolver,),
+        (NonlinearSolver,),
+        (RefreshRule,),
+        (Predictor,),
+        (Globalization,),
+    )
+}
+"""What a plugin may offer, by noun, in the order of a study file: a scene is a flow, or a system of equations."""
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One field of a component, for people to read."""
+
+    name: str
+    type: str
+    default: Any
+    description: str
+
+
+@dataclass(frozen=True)
+class PluginRow:
+    """One offered component, or (`failure` set) why a plugin or a kind is not there."""
+
+    noun: str
+    kind: str
+    source: str
+    parameters: tuple[Parameter, ...] = ()
+    failure: str | None = None
+
+
+@dataclass(frozen=True)
+class _Offer:
+    cls: type[Component]
+    source: str
+
+
+class Registry:
+    """Component classes by noun and kind, and what went wrong on the way to them."""
+
+    def __init__(self) -> None:
+        self._manager = pluggy.PluginManager(hookspecs.PROJECT)
+        self._manager.add_hookspecs(hookspecs)
+        self._offers: dict[tuple[str, str], list[_Offer]] = {}
+        self._failures: list[PluginRow] = []
+
+    @classmethod
+    def installed(cls) -> Registry:
+        """A registry of everything in the entry-point group, one entry at a time, in the order of their names."""
+        registry = cls()
+        for entry in sorted(entry_points(group=hookspecs.PROJECT), key=lambda entry: (entry.name, entry.value)):
+            registry.load(entry)
+        return registry
+
+    def load(self, entry: EntryPoint) -> None:
+        """Import one entry point and register what it holds; a failure becomes a row."""
+        source = f"{entry.dist.name} {entry.dist.version} ({entry.value})" if entry.dist else entry.value
+        try:
+            plugin = entry.load()
+        except Exception as error:  # a stranger's import may raise anything; the rest must still work
+            self._fail(source, f"the plugin {entry.name!r} cannot be imported: {_sentence(error)}")
+        else:
+            self.add(plugin, source)
+
+    def add(self, plugin: object, source: str) -> None:
+        """Register a module or object with a `nlsolve_components` hook; a failure becomes a row."""
+        try:
+            offered = self._offered_by(plugin)
+        except Exception as error:  # as above: a stranger's hook
+            self._fail(source, f"the plugin cannot be registered: {_sentence(error)}")
+            return
+        for cls in offered:
+            self._offers.setdefault((cls.noun, cls.kind_name()), []).append(_Offer(cls, source))
+
+    def _offered_by(self, plugin: object) -> list[type[Component]]:
+        name = self._manager.register(plugin)
+        hooks = self._manager.hook.nlsolve_components.get_hookimpls()
+        own = next((hook for hook in hooks if hook.plugin_name == name), None)
+        if own is None:
+            raise TypeError("it has no function nlsolve_components marked with @hookimpl")
+        offered: Any = own.function()  # not through the manager, which would call every plugin at once
+        return [_checked(cls) for cls in offered]
+
+    def _fail(self, source: str, reason: str) -> None:
+        self._failures.append(PluginRow("", "", source, failure=reason))
+
+    def classes(self, noun: str) -> dict[str, type[Component]]:
+        """The usable classes of one noun, by kind."""
+        return {
+            kind: offers[0].cls
+            for (offered_noun, kind), offers in sorted(self._offers.items(), key=lambda item: item[0])
+            if offered_noun == noun and len(offers) == 1 and offers[0].cls.absent is None
+        }
+
+    def complaint(self, noun: str, kind: object) -> str | None:
+        """Why no class can be had for this noun and kind, in one sentence; None when there is one."""
+        classes = self.classes(noun)
+        if isinstance(kind, str) and kind in classes:
+            return None
+        offers = self._offers.get((noun, kind), []) if isinstance(kind, str) else []
+        if len(offers) == 1:
+            return f"{noun} {kind!r} {offers[0].cls.absent}"
+        if offers:
+            both = " and ".join(offer.source for offer in offers)
+            return f"{noun} {kind!r} is offered by {both}: uninstall all but one"
+        nearest = get_close_matches(str(kind), classes, n=1)
+        guess = f"did you mean {nearest[0]!r}? " if nearest else ""
+        failed = f"; {len(self._failures)} plugin(s) failed, see `nlsolve plugins`" if self._failures else ""
+        return f"no such {noun}; {guess}installed: {', '.join(classes) or 'none'}{failed}"
+
+    def known(self, noun: str, value: object) -> object:
+        """A component, or a table with an installed kind, as it is; PydanticCustomError for anything else."""
+        if isinstance(value, Component):
+            return value
+        if not isinstance(value, Mapping):
+            raise PydanticCustomError("table_expected", 'should be a table with a kind, like { kind = "…" }')
+        if "kind" not in value:
+            kinds = ", ".join(self.classes(noun)) or "none"
+            raise PydanticCustomError("kind_missing", "required, and missing; installed: {kinds}", {"kinds": kinds})
+        complaint = self.complaint(noun, value["kind"])
+        if complaint is not None:
+            raise PydanticCustomError("kind_unknown", "{complaint}", {"complaint": complaint})
+        return value
+
+    def union(self, noun: str) -> Any:
+        """The pydantic type of a section: one of the installed classes, discriminated on `kind`."""
+
+        def known(value: object) -> object:
+            return self.known(noun, value)
+
+        members = tuple(self.classes(noun).values())
+        if len(members) > 1:
+            return Annotated[Union[members], Field(discriminator="kind"), BeforeValidator(known)]  # noqa: UP007
+        return Annotated[members[0] if members else Component, BeforeValidator(known)]
+
+    def plugins(self) -> list[PluginRow]:
+        """A row for every offered component, then a row for every plugin that failed."""
+        order = list(CONTRACTS)
+        rows = []
+        for (noun, kind), offers in sorted(
+            self._offers.items(), key=lambda item: (order.index(item[0][0]), item[0][1])
+        ):
+            failure = self.complaint(noun, kind)
+            rows += [PluginRow(noun, kind, offer.source, _parameters(offer.cls), failure) for offer in offers]
+        return rows + self._failures
+
+
+@cache
+def load_registry() -> Registry:
+    """The registry of this process, loaded at the first call."""
+    return Registry.installed()
+
+
+def _checked(cls: Any) -> type[Component]:
+    """`cls`, a concrete component of a known noun with a literal kind; otherwise a TypeError in a sentence."""
+    contracts = tuple(itertools.chain(*CONTRACTS.values()))
+    if not (isinstance(cls, type) and issubclass(cls, Component) and issubclass(cls, contracts)):
+        raise TypeError(f"{cls!r} is not a subclass of one of {', '.join(c.__name__ for c in contracts)}")
+    if inspect.isabstract(cls):
+        missing = ", ".join(sorted(cls.__abstractmethods__))
+        raise TypeError(f"{cls.__name__} leaves methods of its contract out: {missing}")
+    kind = cls.kind_name()
+    names = get_args(cls.model_fields["kind"].annotation)
+    if names != (kind,):
+        raise TypeError(f'{cls.__name__} must declare its name: kind: Literal["name"] = "name"')
+    return cls
+
+
+def _parameters(cls: type[Component]) -> tuple[Parameter, ...]:
+    return tuple(_parameter(name, info) for name, info in cls.model_fields.items() if name != "kind")
+
+
+def _parameter(name: str, info: FieldInfo) -> Parameter:
+    default = None if info.is_required() else to_jsonable_python(info.get_default(call_default_factory=True))
+    annotation = info.annotation
+    words = annotation.__name__ if isinstance(annotation, type) else str(annotation).replace("typing.", "")
+    return Parameter(name, words, "required" if info.is_required() else default, info.description or "")
+
+
+def _sentence(error: BaseException) -> str:
+    """Exception type and the first line of its text."""
+    return f"{type(error).__name__}: {str(error).strip()}".splitlines()[0]

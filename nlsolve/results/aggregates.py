@@ -1,0 +1,80 @@
+"""Many runs -> few cells of a table: the cheapest run within an error, how many runs there are, or the share solved."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Annotated, Any, ClassVar
+
+import pandas as pd
+from pydantic import Field
+
+from nlsolve.contracts.component import Component
+from nlsolve.contracts.status import Status
+from nlsolve.results.profiles import wilson
+from nlsolve.results.verdicts import SOLVED, Run, cheapest, is_error, percent
+
+NO_RUN = "–"
+"""Stands where no run belongs."""
+
+WITHIN, COUNT = "within", "runs"
+"""Columns that come with the cheapest runs, and with counts."""
+
+Record = dict[str, Any]
+
+
+class Cheapest(Component):
+    """argmin cost over the converged runs with error ≤ each of `within`: what an accuracy costs."""
+
+    noun: ClassVar[str] = "cheapest"
+
+    cost: str = Field("seconds", description="column of `runs` to be least")
+    error: str = Field("velocity_error", description="column of `runs` to be small enough")
+    within: tuple[Annotated[float, Field(gt=0)], ...] = Field(
+        (0.01, 0.001), min_length=1, description="largest errors allowed; a row each"
+    )
+
+    def text(self, within: float) -> str:
+        """A threshold for people."""
+        return percent(within) if is_error(self.error) else f"{within:g}"
+
+    def of(self, runs: Sequence[Run], groups: tuple[str, ...]) -> list[Record]:
+        """A record a threshold and group, with the column `within`; of a group that misses it, nothing but its name."""
+        found = []
+        for within in self.within:
+            for key, members in grouped(runs, groups).items():
+                missed = {"status": Status.CONVERGED.word, **dict(zip(groups, key, strict=True))}
+                best = cheapest(members, self.cost, self.error, within)
+                found.append({**(missed if best is None else best), WITHIN: self.text(within)})
+        return found
+
+
+def counted(runs: Sequence[Run], groups: tuple[str, ...]) -> list[Record]:
+    """A record a group, with the columns `runs`, how many there are, and `solved`, how many of them are."""
+    return [
+        {**dict(zip(groups, key, strict=True)), COUNT: len(members), SOLVED: sum(bool(run[SOLVED]) for run in members)}
+        for key, members in grouped(runs, groups).items()
+    ]
+
+
+def success(runs: Sequence[Run], groups: tuple[str, ...], interval: float, form: str) -> list[Record]:
+    """A record a group, with the column `solved`: the share of runs solved and its interval, "0.85 [0.70, 0.95]"."""
+    found = []
+    for key, members in grouped(runs, groups).items():
+        solved = sum(bool(run[SOLVED]) for run in members)
+        low, high = (format(end, form) for end in wilson(solved, len(members), interval))
+        text = f"{format(solved / len(members), form)} [{low}, {high}]"
+        found.append({**dict(zip(groups, key, strict=True)), SOLVED: text})
+    return found
+
+
+def grouped(runs: Sequence[Run], groups: tuple[str, ...]) -> dict[tuple[Any, ...], list[Run]]:
+    """The runs by their values of some columns, in order of appearance."""
+    found: dict[tuple[Any, ...], list[Run]] = {}
+    for run in runs:
+        found.setdefault(key_of(groups, run), []).append(run)
+    return found
+
+
+def key_of(names: tuple[str, ...], run: Run) -> tuple[Any, ...]:
+    """A run's values of some columns."""
+    return tuple(NO_RUN if pd.isna(run.get(name)) else run.get(name) for name in names)

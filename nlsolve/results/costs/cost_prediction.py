@@ -1,0 +1,63 @@
+"""Predicted seconds of runs: their counts, unit costs measured beside them, and what other runs say of own work."""
+
+from __future__ import annotations
+
+import statistics
+from collections.abc import Sequence
+
+import numpy as np
+import pandas as pd
+
+from nlsolve.results.aggregates import grouped
+from nlsolve.results.columns import RUNS
+from nlsolve.results.costs.unit_costs import COUNTS, PREFIX, UnitCosts
+from nlsolve.results.verdicts import Run, number
+
+PROBLEM = ("scene", "law", "discretizer", "linear")
+"""Sections whose parameters settle what a unit of work costs."""
+
+UNITS = tuple(name for name in RUNS if name.startswith(PREFIX))
+
+
+def with_predictions(runs: pd.DataFrame) -> pd.DataFrame:
+    """The runs with `seconds_predicted` filled in; NaN where no unit costs are known.
+
+    Unit costs are medians over the runs of the same problem and linear solver. The method's own work in an iteration is
+    the median over the runs of the same case with other linear solvers, on which it does not depend; none is added
+    where there are none. So nothing is told from the seconds of the run itself.
+    """
+    if not any(name in runs and runs[name].notna().any() for name in UNITS):
+        return runs
+    parameters = [name for name in map(str, runs.columns) if name not in RUNS and "." in name]
+    of_cell = [name for name in parameters if name.split(".")[0] in PROBLEM]
+    of_case = [name for name in parameters if name.split(".")[0] != "linear"]
+    records = [dict(zip(map(str, runs.columns), row, strict=True)) for row in runs.itertuples(index=False)]
+    records = [{**run, "cell": _key(of_cell, run), "same case": _key(of_case, run)} for run in records]
+    units = {cell: pooled(members) for (cell,), members in grouped(records, ("cell",)).items()}
+    rivals = grouped(records, ("same case",))
+    seconds = []
+    for run in records:
+        unit = units[run["cell"]]
+        others = [other for other in rivals[(run["same case"],)] if other["cell"] != run["cell"]]
+        own = [
+            number(other["seconds_own"]) / number(other["iterations"])
+            for other in others
+            if number(other["iterations"]) > 0
+        ]
+        own_work = number(run["iterations"]) * statistics.median(own) if own else 0.0
+        seconds.append(
+            np.nan if unit is None else unit.predict({name: number(run[name]) for name in COUNTS}) + own_work
+        )
+    return runs.assign(seconds_predicted=seconds)
+
+
+def pooled(runs: Sequence[Run]) -> UnitCosts | None:
+    """Medians of the unit costs measured after each of these runs; None when none were."""
+    known = [run for run in runs if all(number(run.get(name)) >= 0.0 for name in UNITS)]
+    if not known:
+        return None
+    return UnitCosts.of_columns({name: statistics.median(float(run[name]) for run in known) for name in UNITS})
+
+
+def _key(names: Sequence[str], run: Run) -> str:
+    return " ".join(f"{name}={run[name]}" for name in names)

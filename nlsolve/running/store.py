@@ -1,0 +1,170 @@
+"""A results folder: parts written whole as cases finish, merged into tidy files, and resumed by the same study only."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+from pandas.api.types import is_object_dtype
+from pyarrow import ArrowException
+
+from nlsolve.contracts.status import Status
+from nlsolve.results.columns import FIELDS, RUNS, STEPS
+from nlsolve.results.frames import Frames
+from nlsolve.show.tables import TableSpec
+from nlsolve.study.study import Study
+
+STUDY, CASES = "study.json", "cases"
+TRIED_AGAIN = {Status.CRASHED.word, Status.NOT_APPLICABLE.word}
+
+
+class StoreError(ValueError):
+    """A results folder that cannot be used: one sentence with the way out."""
+
+
+@dataclass(frozen=True)
+class Part:
+    """What one case left: its row of `runs`, its rows of `steps` and of `fields`."""
+
+    run: dict[str, Any]
+    steps: pd.DataFrame
+    fields: pd.DataFrame
+
+
+def merge(parts: list[Part]) -> Frames:
+    """Parts, in order, as tidy frames with the documented columns first and the parameters behind them."""
+    names = list(dict.fromkeys([*RUNS, *(name for part in parts for name in part.run)]))
+    runs = pd.DataFrame([part.run for part in parts], columns=names)
+    steps, fields = _stacked([part.steps for part in parts], STEPS), _stacked([part.fields for part in parts], FIELDS)
+    return Frames(runs, steps, fields)
+
+
+class Store:
+    """The folder of one study. Raises StoreError when it belongs to another study or cannot be written."""
+
+    def __init__(self, folder: Path, study: Study) -> None:
+        self.folder, self.study = folder, study
+        identity = _identity(study)
+        with self.writing():
+            (folder / CASES).mkdir(parents=True, exist_ok=True)
+        if (folder / STUDY).exists():
+            found = _read_study(folder)
+            if found.get("cases") != identity["cases"] or found.get("question") != identity["question"]:
+                raise StoreError(
+                    f"{folder}: the folder holds results of another study, or of this one with other settings "
+                    f"({found.get('question', 'no question')!r}): choose another folder with --out, or remove this one"
+                )
+        self.write_text(STUDY, json.dumps(identity, indent=1, ensure_ascii=False) + "\n")
+
+    def load(self, case: str) -> Part | None:
+        """The part of a finished case; None when there is none, it is damaged, the case crashed, or its method did not
+        apply: what it lacked may have been installed since.
+        """
+        try:
+            runs, steps, fields = (pd.read_parquet(self._part(case, name)) for name in ("runs", "steps", "fields"))
+        except (OSError, ValueError, ArrowException):
+            return None
+        if list(runs.get("case", [])) != [case] or runs["status"].iloc[0] in TRIED_AGAIN:
+            return None
+        row = next(runs.itertuples(index=False))
+        return Part(dict(zip(runs.columns, row, strict=True)), steps, fields)
+
+    def save(self, part: Part) -> None:
+        """Keep a part. Its row is written last: a part with a row is complete."""
+        case = part.run["case"]
+        self._parquet(self._part(case, "fields"), part.fields)
+        self._parquet(self._part(case, "steps"), part.steps)
+        self._parquet(self._part(case, "runs"), pd.DataFrame([part.run]))
+
+    def write_frames(self, frames: Frames) -> None:
+        """runs and steps as parquet and CSV, fields as parquet."""
+        for name, frame in (("runs", frames.runs), ("steps", frames.steps)):
+            self._parquet(self.folder / f"{name}.parquet", frame)
+            self.write_text(f"{name}.csv", frame.to_csv(index=False))
+        self._parquet(self.folder / "fields.parquet", frames.fields)
+
+    def write_text(self, name: str, text: str) -> None:
+        """Write a text file whole or not at all."""
+        with self._replacing(self.folder / name) as temporary:
+            temporary.write_text(text, encoding="utf-8")
+
+    def _parquet(self, path: Path, frame: pd.DataFrame) -> None:
+        with self._replacing(path) as temporary:
+            _storable(frame).to_parquet(temporary, index=False)
+
+    def _part(self, case: str, name: str) -> Path:
+        return self.folder / CASES / f"{case}.{name}.parquet"
+
+    @contextmanager
+    def _replacing(self, path: Path) -> Iterator[Path]:
+        """A name to write to, which takes the place of `path` once it is complete."""
+        temporary = path.with_name(f".{path.name}.{os.getpid()}")
+        with self.writing():
+            path.parent.mkdir(parents=True, exist_ok=True)
+            try:
+                yield temporary
+                os.replace(temporary, path)
+            finally:
+                temporary.unlink(missing_ok=True)
+
+    @contextmanager
+    def writing(self) -> Iterator[None]:
+        """Turn a failure of the file system into a StoreError."""
+        try:
+            yield
+        except OSError as error:
+            reason = error.strerror or str(error)
+            raise StoreError(
+                f"{self.folder}: the results cannot be written there ({reason}): choose another folder with --out"
+            ) from error
+
+
+def read_tables(folder: Path) -> tuple[list[TableSpec], pd.DataFrame]:
+    """The tables declared by the study of a results folder, and its runs."""
+    document = _read_study(folder)
+    try:
+        runs = pd.read_parquet(folder / "runs.parquet")
+    except (OSError, ValueError, ArrowException) as error:
+        raise StoreError(f"{folder}: no finished cases can be read there: run the study again with --out") from error
+    return [TableSpec.model_validate(table) for table in document.get("tables", [])], runs
+
+
+def _read_study(folder: Path) -> dict[str, Any]:
+    try:
+        document = json.loads((folder / STUDY).read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise StoreError(f"{folder}: not a results folder: it has no readable {STUDY}") from error
+    if not isinstance(document, dict):
+        raise StoreError(f"{folder}: not a results folder: its {STUDY} was written by something else")
+    return document
+
+
+def _identity(study: Study) -> dict[str, Any]:
+    """What a folder remembers of its study; question and cases must agree for a run to resume."""
+    return {
+        "name": study.name,
+        "question": study.question,
+        "cases": {case.id: dict(case.parameters) for case in study.cases},
+        "tables": [table.model_dump(mode="json") for table in study.tables],
+    }
+
+
+def _stacked(frames: list[pd.DataFrame], columns: Mapping[str, str]) -> pd.DataFrame:
+    filled = [frame for frame in frames if len(frame)]
+    return pd.concat(filled, ignore_index=True) if filled else pd.DataFrame(columns=list(columns))
+
+
+def _storable(frame: pd.DataFrame) -> pd.DataFrame:
+    """A parquet column has one type: where a parameter has numbers in some cases and words in others, all are words."""
+    mixed = []
+    for name, column in frame.items():
+        types = {type(value) for value in column.dropna()} if is_object_dtype(column) else set()
+        if len(types) > 1 and not types <= {int, float}:
+            mixed.append(name)
+    return frame.assign(**{str(name): frame[name].map(str, na_action="ignore") for name in mixed})

@@ -1,0 +1,129 @@
+"""seconds = Σ_kind n_kind c_kind : what a method's work costs on this machine, by counts and measured unit costs.
+
+A Taylor coefficient of order j costs c_order + j c_term, since order j convolves j earlier terms; a series of p orders
+costs p c_order + ½ p (p + 1) c_term. Counts do not depend on what a factorisation costs, as no refresh rule asks for
+the clock: the counts of one run predict its seconds with any linear solver.
+"""
+
+from __future__ import annotations
+
+import operator
+import statistics
+import time
+from collections import defaultdict
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import scipy.optimize
+from threadpoolctl import threadpool_limits
+
+from nlsolve.algebra.simulation import Algebraic, AlgebraicSetup
+from nlsolve.contracts.linear_solver import LinearSolver
+from nlsolve.contracts.problem import Expansion, NonlinearProblem
+from nlsolve.flow.setup import Setup
+from nlsolve.flow.state import sample
+from nlsolve.results.costs.unit_costs import UnitCosts
+from nlsolve.series import Array
+
+ROUNDS = 5
+"""How often all kinds of work are timed in turn."""
+
+FEWEST_ROUNDS, ENOUGH_SECONDS = 2, 1.0
+"""Rounds that are made however long they take, and seconds after which no further one is begun."""
+
+ORDER = 20
+"""Orders of the series that is timed; the cost of later ones is on the line through these."""
+
+PART_OF_STATE = 0.9
+"""R at this part of the solution is a right-hand side as a march has them; R at the solution is rounding."""
+
+RATIO_OF_TERMS = 0.5
+"""Of the coefficients pushed: none of their products may become so small that arithmetic slows down."""
+
+
+CLOCKS: dict[str, Callable[[], float]] = {"wall": time.perf_counter, "processor": time.process_time}
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """What a case that has not been run costs: its size, seconds of its operators, and unit costs."""
+
+    nodes: int | None
+    unknowns: int
+    operators: float
+    unit: UnitCosts
+
+
+def calibrate(setup: Setup | AlgebraicSetup, rounds: int = ROUNDS) -> Calibration:
+    """On the cloud a case begins with (see `balance.sample`), or at the start of a system. Raises SolveError where the
+    cloud or the first tangent is bad.
+    """
+    with threadpool_limits(limits=1):
+        if isinstance(setup, AlgebraicSetup):
+            system, start = Algebraic(setup.scene), setup.scene.start()
+            return Calibration(None, len(start), 0.0, measure(system, setup.linear, start, rounds))
+        problem, state, ledger = sample(setup)
+        unit = measure(problem, setup.linear, state, rounds)
+    return Calibration(len(problem.cloud.nodes), len(state), ledger.seconds["operators"], unit)
+
+
+@np.errstate(all="ignore")
+def measure(
+    problem: NonlinearProblem,
+    linear: LinearSolver,
+    state: Array,
+    rounds: int = ROUNDS,
+    clock: Callable[[], float] = time.process_time,
+) -> UnitCosts:
+    """Medians of rounds in which every kind of work is done in turn, as a method does it, around a state (U,).
+
+    Raises SolveError where the tangent there cannot be factorised.
+    """
+    watch = _Watch(clock)
+    begun = clock()
+    factors = linear.factorize(problem.jacobian(state))  # settles the ordering, off the clock
+    for done in range(rounds):
+        if done >= FEWEST_ROUNDS and clock() - begun > ENOUGH_SECONDS:
+            break
+        matrix = watch("jacobian", problem.jacobian, state)
+        factors = watch("factorization", linear.factorize, matrix, factors)
+        expansion = watch("expansion", _begun, problem, state)
+        for j in range(1, ORDER + 1):
+            rhs = watch("residual", problem.residual, PART_OF_STATE * state)
+            solution = watch("triangular_solve", factors.solve, rhs)
+            watch("matrix_product", operator.matmul, matrix, solution)
+            expansion.append(RATIO_OF_TERMS**j * state)
+            watch(f"order {j}", expansion.coefficient, j)
+    orders = np.arange(1, ORDER + 1)
+    growth = np.stack([np.ones(ORDER), orders], axis=1)
+    (series_order, series_term), _ = scipy.optimize.nnls(growth, np.array([watch.median(f"order {j}") for j in orders]))
+    return UnitCosts(
+        **{kind: watch.median(kind) for kind in UnitCosts.__dataclass_fields__ if not kind.startswith("series")},
+        series_order=float(series_order),
+        series_term=float(series_term),
+    )
+
+
+def _begun(problem: NonlinearProblem, state: Array) -> Expansion:
+    expansion = problem.expand(state)
+    expansion.coefficient(0)
+    return expansion
+
+
+class _Watch:
+    """Seconds of each piece of work, by kind."""
+
+    def __init__(self, clock: Callable[[], float]) -> None:
+        self._clock = clock
+        self._seconds: defaultdict[str, list[float]] = defaultdict(list)
+
+    def __call__(self, kind: str, work: Callable[..., Any], *arguments: Any) -> Any:
+        begun = self._clock()
+        result = work(*arguments)
+        self._seconds[kind].append(self._clock() - begun)
+        return result
+
+    def median(self, kind: str) -> float:
+        return statistics.median(self._seconds[kind])

@@ -1,0 +1,263 @@
+"""A value of every run in a grid of cells, and what became of the run: right, doubted, wrong, or failed how."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import LogNorm
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch, Polygon, Rectangle
+from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
+from pydantic import Field
+
+from nlsolve.contracts.status import Status
+from nlsolve.results.frames import Frames
+from nlsolve.results.verdicts import (
+    ACCEPTED,
+    WRONG,
+    Run,
+    doubt,
+    is_error,
+    names_settings,
+    number,
+    outcome,
+    percent,
+    telling,
+)
+from nlsolve.show.figures.base import BaseFigure, Names, listing
+from nlsolve.show.figures.cases import label_of, number_text, records_of, select
+from nlsolve.show.figures.style import (
+    ACCENT,
+    COLUMN,
+    ERROR_MAP,
+    IN_DOUBT,
+    MILLIMETRE,
+    PAGE,
+    axis_label,
+    legend_outside,
+    letters,
+)
+
+MOST_CELLS = 2000
+ROW, CELL, LETTER, MARGIN = 4.6, 17.0, 1.45, 8.0  # height of a row, widths of a column and of a label's letter [mm]
+LETTERS_IN_CELL = 7  # "0.031 %"
+DOUBT = "#D55E00"
+FAILED_FACE: Any = {"facecolor": "0.93", "edgecolor": "0.72", "hatch": "//////", "linewidth": 0}
+NO_NUMBER = "–"
+
+
+@dataclass(frozen=True)
+class Cell:
+    """A run in the grid: its column and row, its number (NaN for none), its outcome, whether it is in doubt."""
+
+    column: int
+    row: int
+    value: float
+    outcome: str
+    doubted: bool
+    failed: bool
+
+
+class MapFigure(BaseFigure):
+    """value(x, y) in logarithmic colours, a cell a run, categories in their order of appearance.
+
+    A failed run is hatched and shows a code of its status; a corner marks a run in doubt; a red frame marks a false
+    success: converged, no doubt, error > accepted. The error is `value` if it is one, else that of the velocity.
+    """
+
+    kind: Literal["map"] = "map"
+    x: Names = Field(min_length=1, description="column or columns of `runs` along the top")
+    y: Names = Field(min_length=1, description="column or columns of `runs` down the side")
+    value: str = Field("velocity_error", description="column of `runs` in the cells")
+    accepted: float = Field(ACCEPTED, gt=0, description="error above which an undoubted run is a false success")
+    separate: bool = Field(False, description='a line where the part of the y label before " = " changes')
+
+    def columns_of_runs(self) -> dict[str, Names]:
+        return {**super().columns_of_runs(), "x": self.x, "y": self.y, "value": (self.value,)}
+
+    def paint(self, figure: Figure, frames: Frames) -> None:
+        runs = select(self, frames.runs)
+        for column in (*self.x, *self.y, self.value):
+            self.require(column, runs, "runs")
+        records = records_of(runs)
+        across, down = ([_category(names, run) for run in records] for names in (self.x, self.y))
+        columns, rows = list(dict.fromkeys(across)), list(dict.fromkeys(down))
+        self._refuse_twins(runs, list(zip(across, down, strict=True)))
+        if len(columns) * len(rows) > MOST_CELLS:
+            raise self.refuse(f"{len(rows)} by {len(columns)} cells are too many; choose at most {MOST_CELLS}")
+        cells = [
+            self._cell(run, columns.index(x), rows.index(y)) for run, x, y in zip(records, across, down, strict=True)
+        ]
+        norm = self._norm(cells)
+        beside, above = (LETTER * max(map(letters, labels)) for labels in (rows, columns))
+        width = float(
+            np.clip(beside + max(CELL, above) * len(columns) + MARGIN, COLUMN / MILLIMETRE, PAGE / MILLIMETRE)
+        )
+        room = (width - beside - MARGIN) / len(columns)
+        height = ROW * len(rows) + 6 + 20 * (norm is not None) + 0.6 * above * (above > room)
+        figure.set_size_inches(width * MILLIMETRE, height * MILLIMETRE)
+        axes = figure.add_subplot()
+        self._grid(axes, columns, rows, leaning=above > room)
+        size = float(np.clip(room / LETTERS_IN_CELL / 0.16, 4.5, 7.5))  # a letter is 0.16 mm wide a point of type
+        for cell in cells:
+            self._paint_cell(axes, cell, norm, size)
+        self._empty_cells(axes, {(cell.column, cell.row) for cell in cells}, len(columns), len(rows), size)
+        if norm is not None:
+            self._bar(figure, axes, norm, len(rows))
+        if self.title:
+            axes.set_title(self.title)
+        self._legend(figure, cells)
+
+    def _refuse_twins(self, runs: pd.DataFrame, places: Sequence[tuple[str, str]]) -> None:
+        for place in dict.fromkeys(places):
+            here = [number for number, other in enumerate(places) if other == place]
+            if len(here) > 1:
+                raise self.refuse(
+                    f"{len(here)} runs land in the cell {place[0]!r}, {place[1]!r}; "
+                    f"they differ in {listing(telling(runs.iloc[here]))}: add one to `x` or `y`, or choose with `where`"
+                )
+
+    def _cell(self, run: Run, column: int, row: int) -> Cell:
+        error = self.value if is_error(self.value) else "velocity_error"
+        failed = run["status"] != Status.CONVERGED.word
+        judged = outcome(run, self.accepted, error)
+        return Cell(column, row, number(run[self.value]), judged, bool(doubt(run)), failed)
+
+    def _norm(self, cells: Sequence[Cell]) -> LogNorm | None:
+        """Colours from the least to the largest number of converged runs, of errors to 100 %; None without any."""
+        converged = [cell.value for cell in cells if not cell.failed]
+        numbers = [value for value in converged if np.isfinite(value) and value > 0]
+        if converged and not numbers:
+            raise self.refuse(f"value = {self.value!r} holds no positive number in the {len(converged)} converged runs")
+        if not numbers:
+            return None
+        low, high = 10 ** np.floor(np.log10(min(numbers))), 10 ** np.ceil(np.log10(max(numbers)))
+        if is_error(self.value):
+            high = min(high, 1.0)
+        return LogNorm(low, high if high > low else 10 * low, clip=True)
+
+    def _grid(self, axes: Axes, columns: Sequence[str], rows: Sequence[str], leaning: bool) -> None:
+        axes.set(xlim=(-0.5, len(columns) - 0.5), ylim=(len(rows) - 0.5, -0.5))
+        axes.set_xticks(range(len(columns)), columns)
+        axes.set_yticks(range(len(rows)), rows)
+        axes.tick_params(length=0, top=False, right=False, labeltop=True, labelbottom=False)
+        if leaning:
+            axes.tick_params(axis="x", labelrotation=35)
+            for label in axes.get_xticklabels():
+                label.set(horizontalalignment="left", rotation_mode="anchor")
+        axes.xaxis.set_label_position("top")
+        if len(self.x) == 1 and not names_settings(self.x[0]):
+            axes.set_xlabel(axis_label(self.x, "runs"))
+        if len(self.y) == 1 and not names_settings(self.y[0]):
+            axes.set_ylabel(axis_label(self.y, "runs"))
+        for spine in axes.spines.values():
+            spine.set_visible(False)
+        families = [row.split(" = ")[0] for row in rows]
+        for row in range(1, len(rows)):
+            if self.separate and families[row] != families[row - 1]:
+                axes.axhline(row - 0.5, color="0.25", linewidth=0.6, zorder=4)
+
+    def _paint_cell(self, axes: Axes, cell: Cell, norm: LogNorm | None, size: float) -> None:
+        left, top = cell.column - 0.5, cell.row - 0.5
+        ink = "0.1"
+        if cell.failed:
+            axes.add_patch(Rectangle((left, top), 1, 1, **FAILED_FACE))
+        elif norm is not None and np.isfinite(cell.value):
+            red, green, blue, _ = ERROR_MAP(norm(max(cell.value, norm.vmin or 0)))
+            ink = "0.1" if 0.3 * red + 0.59 * green + 0.11 * blue > 0.5 else "white"
+            axes.add_patch(Rectangle((left, top), 1, 1, facecolor=(red, green, blue), edgecolor="none"))
+        axes.add_patch(Rectangle((left, top), 1, 1, facecolor="none", edgecolor="white", linewidth=0.8, zorder=2))
+        words = code(cell.outcome) if cell.failed else short(cell.value, self.value)
+        box: Any = {"facecolor": "0.93", "edgecolor": "none", "pad": 0.6} if cell.failed else None
+        axes.text(
+            cell.column,
+            cell.row,
+            words,
+            ha="center",
+            va="center_baseline",
+            fontsize=size,
+            color=ink,
+            bbox=box,
+            zorder=5,
+        )
+        if cell.doubted:
+            corner = [(left + 0.86, top + 0.04), (left + 0.985, top + 0.04), (left + 0.985, top + 0.5)]
+            axes.add_patch(Polygon(corner, facecolor=DOUBT, edgecolor="white", linewidth=0.4, zorder=3))
+        if cell.outcome == WRONG:
+            axes.add_patch(
+                Rectangle(
+                    (left + 0.02, top + 0.07), 0.96, 0.86, facecolor="none", edgecolor=ACCENT, linewidth=1.5, zorder=6
+                )
+            )
+
+    def _empty_cells(self, axes: Axes, taken: set[tuple[int, int]], columns: int, rows: int, size: float) -> None:
+        for column in range(columns):
+            for row in range(rows):
+                if (column, row) not in taken:
+                    axes.text(column, row, "·", ha="center", va="center", fontsize=size, color="0.6")
+
+    def _bar(self, figure: Figure, axes: Axes, norm: LogNorm, rows: int) -> None:
+        bar = figure.colorbar(
+            ScalarMappable(norm, ERROR_MAP),
+            ax=axes,
+            location="bottom",
+            aspect=40,
+            fraction=0.03,
+            pad=0.5 / rows,
+            shrink=0.8,
+        )
+        bar.set_label(axis_label([self.value], "runs"))
+        bar.ax.xaxis.set_major_locator(LogLocator(numticks=12))
+        bar.ax.xaxis.set_minor_locator(NullLocator())
+        bar.ax.xaxis.set_major_formatter(FuncFormatter(lambda value, _: short(value, self.value)))
+        bar.outline.set_linewidth(0.5)
+
+    def _legend(self, figure: Figure, cells: Sequence[Cell]) -> None:
+        """What the marks mean: only those that are there."""
+        handles: list[Any] = []
+        wrong = [cell for cell in cells if cell.outcome == WRONG]
+        if wrong:
+            limit = short(self.accepted, "velocity_error")
+            words = f"false success: error above {limit} ({len(wrong)})"
+            handles.append(Patch(facecolor="white", edgecolor=ACCENT, linewidth=1.5, label=words))
+        doubted = sum(cell.doubted for cell in cells)
+        if doubted:
+            corner: Any = {"linestyle": "none", "marker": (3, 0, -45), "markersize": 7, "markeredgewidth": 0}
+            handles.append(Line2D([], [], color=DOUBT, label=f"{IN_DOUBT} ({doubted})", **corner))
+        failed = [cell.outcome for cell in cells if cell.failed]
+        for status in dict.fromkeys(failed):
+            words = f"{code(status)}: {status} ({failed.count(status)})"
+            handles.append(Patch(**FAILED_FACE, label=words))
+        if handles:
+            legend_outside(figure, handles, [handle.get_label() for handle in handles], "lower")
+
+
+def code(status: str) -> str:
+    """ "budget spent" -> "BS", "diverged" -> "DIV"."""
+    words = status.split()
+    return ("".join(word[0] for word in words) if len(words) > 1 else status[:3]).upper()
+
+
+def short(value: float, column: str) -> str:
+    """Two digits: errors in percent from 0.01 % to 1000 %; 3e-5 and 2e4 for what is very small or large."""
+    if not np.isfinite(value):
+        return NO_NUMBER
+    if is_error(column) and 1e-4 <= value < 10:
+        return percent(float(f"{value:.2g}"))
+    if 1e-2 <= abs(value) < 1e4 or not value:
+        return f"{value:.0f}" if abs(value) >= 100 else f"{value:.2g}"
+    mantissa, power = f"{value:.0e}".split("e")
+    return f"{mantissa}e{int(power)}"
+
+
+def _category(names: Names, run: Run) -> str:
+    """What a run's row or column is called: the bare value of one column, words for several."""
+    values = {name: run[name] for name in names if not pd.isna(run[name])}
+    return number_text(*values.values()) if len(names) == len(values) == 1 else label_of(values) or NO_NUMBER

@@ -1,0 +1,75 @@
+"""Where the material went: the nodes, or the markers that left them, at a time, by the half they started in."""
+
+from __future__ import annotations
+
+from typing import Any, Literal
+
+import numpy as np
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from pydantic import Field
+from scipy.spatial import cKDTree
+
+from nlsolve.results.frames import Frames
+from nlsolve.show.figures.nodes.panels import PanelsFigure, panels_of, snapshots_of
+from nlsolve.show.figures.nodes.sections import Array, boundaries
+from nlsolve.show.figures.style import ACCENT, COLOURS
+
+HALVES = (("$y_0 > 0$", COLOURS[0]), (r"$y_0 \leq 0$", COLOURS[4]))
+RING: Any = {"markerfacecolor": "none", "markeredgecolor": ACCENT, "markeredgewidth": 1.2}
+
+
+class CloudFigure(PanelsFigure):
+    """The nodes at a time, coloured by the half-disc (sign of y at t = 0) they started in: material mixing.
+
+    Where a case has markers they are drawn in place of its nodes, less those that have left the cloud.
+    """
+
+    kind: Literal["cloud"] = "cloud"
+    probe: tuple[float, float] | None = Field(None, description="place at t = 0 whose nearest node is marked [mm]")
+
+    def paint(self, figure: Figure, frames: Frames) -> None:
+        snapshots = snapshots_of(self, frames, ("x", "y", "x0", "y0"))
+        for axes, snapshot in panels_of(figure, self, snapshots, bar=False):
+            self._nodes(axes, snapshot.rows)
+        dot: Any = {"linestyle": "none", "marker": "o"}
+        handles = [Line2D([], [], color=colour, markeredgewidth=0, label=label, **dot) for label, colour in HALVES]
+        handles.append(Line2D([], [], color="white", markeredgecolor="black", label="boundary", **dot))
+        if self.probe is not None:
+            handles.append(Line2D([], [], markersize=6, label="probe", **dot, **RING))
+        off_the_title: Any = "outside lower center" if figure.get_suptitle() else "outside upper center"
+        figure.legend(handles=handles, loc=off_the_title, ncols=len(handles), handlelength=1)
+
+    def _nodes(self, axes: Axes, rows: pd.DataFrame) -> None:
+        nodes, rows = rows[["x", "y"]].to_numpy(float), _material(rows)
+        places, start = rows[["x", "y"]].to_numpy(float), rows[["x0", "y0"]].to_numpy(float)
+        wall, upper = boundaries(rows) != "", start[:, 1] > 0
+        size = _marker_size(axes, nodes)
+        edge: Any = {"markersize": 1.2 * size, "markeredgecolor": "black", "markeredgewidth": min(0.5, 0.25 * size)}
+        for half, (_, colour) in zip((upper, ~upper), HALVES, strict=True):
+            axes.plot(*places[half & ~wall].T, "o", color=colour, markersize=size, markeredgewidth=0)
+            axes.plot(*places[half & wall].T, "o", color=colour, clip_on=self.window is not None, **edge)
+        if self.probe is not None:
+            marked = int(np.hypot(*(start - self.probe).T).argmin())
+            axes.plot(*places[marked], "o", markersize=max(2.5 * size, 5), **RING)
+
+
+def _material(rows: pd.DataFrame) -> pd.DataFrame:
+    """The rows with the places x, y of their markers where there are any."""
+    marked = rows.reindex(columns=["marker_x", "marker_y"]).notna().all(axis=1)
+    if not marked.any():
+        return rows
+    return rows[marked].assign(x=rows["marker_x"], y=rows["marker_y"])
+
+
+def _marker_size(axes: Axes, places: Array) -> float:
+    """Diameter in points: half the typical distance between neighbours as it will be printed."""
+    spacing = float(np.median(cKDTree(places).query(places, 2)[0][:, 1]))
+    left, right = axes.get_xlim()
+    figure = axes.get_figure()
+    assert isinstance(figure, Figure)
+    columns = axes.get_gridspec().ncols  # type: ignore[union-attr]
+    printed = 0.8 * figure.get_figwidth() / columns * 72 / (right - left) * spacing
+    return float(np.clip(0.55 * printed, 0.5, 4))

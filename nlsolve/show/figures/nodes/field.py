@@ -1,0 +1,76 @@
+"""A nodal value in colours over the material."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import numpy as np
+from matplotlib.collections import LineCollection
+from matplotlib.figure import Figure
+from matplotlib.ticker import FixedLocator, FuncFormatter, MaxNLocator
+from pydantic import Field
+
+from nlsolve.results.frames import Frames
+from nlsolve.show.figures.nodes.panels import PanelsFigure, panels_of, snapshots_of
+from nlsolve.show.figures.nodes.sections import Array, outline, triangulate
+from nlsolve.show.figures.style import axis_label
+
+SIGNED_MAP, POSITIVE_MAP = "RdBu_r", "viridis"
+LEVELS = 20
+FLOOR = 1e-12  # of the largest value: what a logarithmic field shows at least
+
+
+class FieldFigure(PanelsFigure):
+    """Filled contours of a nodal value: diverging colours about 0 for what has a sign, sequential ones for ε̄."""
+
+    kind: Literal["field"] = "field"
+    value: Literal["u", "v", "exx", "eyy", "exy", "rate"] = Field(description="column of `fields`")
+    log: bool = Field(False, description="logarithmic colours; for `rate`")
+    limit: float | None = Field(
+        None, gt=0, description="largest magnitude the colours distinguish; absent: the largest"
+    )
+
+    def paint(self, figure: Figure, frames: Frames) -> None:
+        if self.log and self.value != "rate":
+            raise self.refuse(f"value = {self.value!r} has a sign, so log = true cannot show it; only 'rate' can")
+        snapshots = snapshots_of(self, frames, ("x", "y", self.value))
+        levels, extend = self._levels(np.concatenate([s.rows[self.value].to_numpy(float) for s in snapshots]))
+        panels = panels_of(figure, self, snapshots, bar=True)
+        contours = None
+        for axes, snapshot in panels:
+            value = snapshot.rows[self.value].to_numpy(float)
+            triangles = triangulate(snapshot.rows, value)
+            shown = np.where(np.isfinite(value), value, levels[0])
+            if self.log:
+                shown = np.log10(np.maximum(shown, FLOOR * np.nanmax(value)))
+            colours = POSITIVE_MAP if self.value == "rate" else SIGNED_MAP
+            contours = axes.tricontourf(triangles, shown, levels=levels, cmap=colours, extend=extend)
+            contours.set_edgecolor("face")  # hides the seams that PDF viewers draw between bands
+            contours.set_linewidth(0.2)
+            axes.add_collection(LineCollection(list(outline(triangles)), colors="0.25", linewidths=0.5))
+        assert contours is not None
+        bar = figure.colorbar(contours, ax=figure.axes, fraction=0.05, pad=0.02, aspect=25)
+        bar.set_label(axis_label([self.value], "fields"))
+        bar.ax.tick_params(direction="out", right=True)
+        bar.outline.set_linewidth(0.5)
+        ticks = MaxNLocator(7, integer=self.log, steps=[1, 2, 5, 10]).tick_values(levels[0], levels[-1])
+        bar.locator = FixedLocator([tick for tick in ticks if levels[0] <= tick <= levels[-1]])
+        if self.log:
+            bar.formatter = FuncFormatter(lambda power, _: f"$10^{{{power:.0f}}}$")
+        bar.update_ticks()
+
+    def _levels(self, values: Array) -> tuple[Array, Literal["neither", "both", "min", "max"]]:
+        largest = float(np.nanmax(np.abs(values)))
+        top = self.limit or largest or 1.0
+        cut = largest > top * (1 + 1e-12)
+        if self.log:
+            positive = values[values > 0]
+            if not positive.size:
+                raise self.refuse(f"value = {self.value!r} is nowhere positive, so log = true shows nothing")
+            low = np.floor(np.log10(max(float(positive.min()), FLOOR * largest)))
+            high = max(np.ceil(np.log10(top)), low + 1)
+            return np.linspace(low, high, int(high - low) * max(1, round(LEVELS / (high - low))) + 1), "neither"
+        bottom = 0.0 if self.value == "rate" else -top
+        ends: Literal["neither", "both", "max"] = "neither" if not cut else "max" if self.value == "rate" else "both"
+        # an odd number of bands, so that one of them is centred on 0 and a field at rest is white
+        return np.linspace(bottom, top, LEVELS + 2), ends

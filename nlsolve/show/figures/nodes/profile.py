@@ -1,0 +1,60 @@
+"""A nodal value along a straight line, beside the exact one."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import numpy as np
+import pandas as pd
+from matplotlib.figure import Figure
+from pydantic import Field
+
+from nlsolve.results.frames import Frames
+from nlsolve.show.figures.nodes.panels import NodesFigure, snapshots_of
+from nlsolve.show.figures.nodes.sections import Array, slice_triangles, triangulate
+from nlsolve.show.figures.style import SYMBOLS, axis_label, curve_style, finish, join
+
+
+class ProfileFigure(NodesFigure):
+    """A nodal value along a line parallel to an axis, linear on the cloud's triangles, and the exact value with it."""
+
+    kind: Literal["profile"] = "profile"
+    axis: Literal["x", "y"] = Field(description="the coordinate that varies along the line")
+    at: float = Field(0.0, description="the other coordinate, constant along the line [mm]")
+    value: Literal["u", "v", "exx", "eyy", "exy", "rate"] = Field(description="column of `fields`")
+    log: bool = Field(False, description="logarithmic vertical axis")
+
+    def paint(self, figure: Figure, frames: Frames) -> None:
+        snapshots = snapshots_of(self, frames, ("x", "y", self.value))
+        axes = figure.add_subplot()
+        axes.set_yscale("log" if self.log else "linear")
+        exact = f"exact_{self.value}"
+        exacts: list[tuple[Array, Array]] = []
+        for number, snapshot in enumerate(snapshots):
+            label = snapshot.heading if len(snapshots) > 1 else snapshot.label
+            if snapshot.rows.empty:
+                axes.plot([], [], label=f"{label} (no values)", **curve_style(number, 0, False))
+                continue
+            place, value = self._slice(snapshot.rows, self.value)
+            axes.plot(place, value, label=label, **curve_style(number, len(place), False))
+            if exact in snapshot.rows and np.isfinite(snapshot.rows[exact].to_numpy(float)).any():
+                pair = self._slice(snapshot.rows, exact)
+                if not any(np.array_equal(pair, known, equal_nan=True) for known in exacts):
+                    exacts.append(pair)
+        for number, pair in enumerate(exacts):
+            label = "" if number else "exact"
+            axes.plot(*pair, color="black", linestyle=(0, (4, 3)), linewidth=0.6, zorder=3, label=label)
+        if exacts and len(snapshots) == 1 and not snapshots[0].label:
+            axes.lines[0].set_label(SYMBOLS[self.value])
+        other = "y" if self.axis == "x" else "x"
+        if all(not np.isfinite(line.get_ydata()).any() for line in axes.lines):
+            raise self.refuse(f"the line {other} = {self.at:g} mm misses the cloud; move it with `at`")
+        axes.set_xlabel(axis_label([self.axis], "fields"))
+        axes.set_ylabel(axis_label([self.value], "fields"))
+        note = snapshots[0].note if len(snapshots) == 1 else ""
+        finish(figure, axes, join(self.title, note))
+
+    def _slice(self, rows: pd.DataFrame, column: str) -> tuple[Array, Array]:
+        value = rows[column].to_numpy(float)
+        along, across = (rows[name].to_numpy(float) for name in (("x", "y") if self.axis == "x" else ("y", "x")))
+        return slice_triangles(triangulate(rows, value), along, across - self.at, value)

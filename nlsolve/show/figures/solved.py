@@ -1,0 +1,192 @@
+"""Which part of the problems each strategy solves, within what cost; what it does not solve stays in the count."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Annotated, Any, Literal
+
+import numpy as np
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import LogFormatter
+from pydantic import BeforeValidator, Field
+
+from nlsolve.results.columns import RUNS
+from nlsolve.results.frames import Frames
+from nlsolve.results.profiles import band, ratios, within
+from nlsolve.results.verdicts import ACCEPTED, Run, number, settled, solved, telling
+from nlsolve.series import Array
+from nlsolve.show.figures.base import BaseFigure, Names, listing
+from nlsolve.show.figures.cases import label_of, labelled, records_of, select
+from nlsolve.show.figures.style import PAGE, axis_label, curve_style, finish, join, symbol
+
+Weights = Annotated[
+    dict[str, Annotated[float, Field(gt=0)]],
+    BeforeValidator(lambda value: {value: 1.0} if isinstance(value, str) else value),
+    Field(min_length=1),
+]
+WIDEST_BAND = 0.13  # its opacity: many lie over each other
+
+
+@dataclass(frozen=True)
+class Costs:
+    """cost : (S, P), ∞ where strategy s did not solve problem p; labels : the S strategies' names."""
+
+    labels: tuple[str, ...]
+    cost: Array
+
+
+class SolvedFigure(BaseFigure):
+    """A rising stair a strategy (`group`) over a logarithmic cost; it ends at the share of problems it solves at all.
+
+    A run is a problem solved when it converged, with a verified residual and an error that is accepted or unknown
+    (`outcomes.solved`); any other costs ∞. Bands hold the part `interval` of the shares when the problems are drawn
+    anew (Efron 1979).
+    """
+
+    group: Names = Field(("variant",), min_length=1, description="columns of `runs` that tell the strategies apart")
+    problem: Names = Field(
+        (), description="columns that tell the problems apart; absent: those that differ within a strategy"
+    )
+    cost: Weights = Field(
+        {"seconds": 1.0}, description="column of `runs`, or columns and the weights they are added with"
+    )
+    accepted: float = Field(ACCEPTED, gt=0, description="error above which a run is not solved")
+    error: str = Field("velocity_error", description="column of `runs` that holds this error")
+    bootstrap: int = Field(1000, ge=0, description="draws of problems behind the bands; 0: no bands")
+    interval: float = Field(0.9, gt=0, lt=1, description="confidence of the bands")
+    seed: int = Field(0, ge=0, description="of the draws")
+
+    def columns_of_runs(self) -> dict[str, Names]:
+        return {
+            **super().columns_of_runs(),
+            "problem": self.problem,
+            "cost": tuple(self.cost),
+            "error": (self.error,),
+        }
+
+    @abstractmethod
+    def abscissa(self, costs: Array) -> Array:
+        """What a share is taken of, shape (S, P): the costs themselves or something made of them."""
+
+    @abstractmethod
+    def words(self) -> str:
+        """The label of the horizontal axis."""
+
+    def paint(self, figure: Figure, frames: Frames) -> None:
+        runs = select(self, frames.runs)
+        for column in (*self.problem, *self.cost, self.error):
+            self.require(column, runs, "runs")
+        found = self.costs(runs)
+        reached = self.abscissa(found.cost)
+        places = np.unique(reached[np.isfinite(reached)])
+        if not len(places):
+            raise self.refuse(f"none of the {len(runs)} chosen runs solved its problem, so there is no cost to show")
+        figure.set_size_inches(PAGE, 0.5 * PAGE)
+        axes = figure.add_subplot()
+        axes.set(xscale="log", xlabel=self.words(), ylabel="share of the problems solved", ylim=(-0.02, 1.02))
+        right = places[-1] * max(1.05, (places[-1] / places[0]) ** 0.03)
+        self._stairs(axes, found.labels, reached, np.r_[places, right])
+        axes.set_xlim(places[0], right)
+        axes.xaxis.set_major_formatter(LogFormatter())
+        axes.xaxis.set_minor_formatter(LogFormatter(minor_thresholds=(1.0, 0.4)))
+        finish(figure, axes, None)
+        hard = int(np.isinf(reached).all(axis=0).sum())
+        nobody = f"{hard} of {reached.shape[1]} problems are solved by none" if hard else ""
+        axes.set_title(join(self.title, nobody))
+
+    def costs(self, runs: pd.DataFrame) -> Costs:
+        """The cost of every strategy for every problem; refused unless each has run each once."""
+        groups = labelled(self, runs, one_case=False)
+        problem = self.problem or _differing(runs, self.group)
+        tables = [self._by_problem(label, members, problem) for label, members in groups]
+        everyone = list(dict.fromkeys(key for table in tables for key in table))
+        for (label, _), table in zip(groups, tables, strict=True):
+            missing = [key for key in everyone if key not in table]
+            if missing:
+                first = ", ".join(f"{name} = {value}" for name, value in zip(problem, missing[0], strict=True))
+                raise self.refuse(
+                    f"{label} has no run of {len(missing)} of the {len(everyone)} problems, such as {first}: "
+                    "choose with `where`, or say with `problem` what tells the problems apart"
+                )
+        cost = np.array([[self._cost(table[key]) for key in everyone] for table in tables])
+        return Costs(tuple(label for label, _ in groups), cost)
+
+    def _by_problem(self, label: str, members: pd.DataFrame, problem: Names) -> Mapping[tuple[str, ...], Run]:
+        table: dict[tuple[str, ...], Run] = {}
+        for run in records_of(members):
+            key = tuple(str(run[name]) for name in problem)
+            if key in table:
+                several = members[[tuple(map(str, row)) == key for row in members[list(problem)].to_numpy(object)]]
+                raise self.refuse(
+                    f"{len(several)} runs of {label} are of one problem; they differ in {listing(telling(several))}: "
+                    "add one to `problem` or `group`, or choose with `where`"
+                )
+            table[key] = run
+        return table
+
+    def _cost(self, run: Run) -> float:
+        """Σ weight · column; ∞ for what is not solved."""
+        if not solved(run, self.accepted, self.error):
+            return np.inf
+        total = sum(weight * number(run[column]) for column, weight in self.cost.items())
+        if not 0.0 < total < np.inf:
+            where = label_of({name: run[name] for name in self.group})
+            raise self.refuse(
+                f"a solved run of {where} has the cost {total:g}, which a logarithmic axis cannot show: "
+                f"choose other columns than {listing(list(self.cost))}"
+            )
+        return float(total)
+
+    def _stairs(self, axes: Axes, labels: tuple[str, ...], reached: Array, places: Array) -> None:
+        shares = within(reached, places)
+        ends = band(reached, places, self.interval, self.bootstrap, self.seed) if self.bootstrap else None
+        problems = reached.shape[1]
+        for line, label in enumerate(labels):
+            style = curve_style(line, len(places), markers=False)
+            count = int(np.isfinite(reached[line]).sum())
+            axes.step(places, shares[line], where="post", label=f"{label} ({count}/{problems})", **style)
+            if ends is not None:
+                low, high = ends[0][line], ends[1][line]
+                fill: Any = {"step": "post", "color": style["color"], "alpha": WIDEST_BAND, "linewidth": 0}
+                axes.fill_between(places, low, high, **fill)
+
+    def work(self) -> str:
+        """ "time inside the method", "triangular solves + 20 factorisations"."""
+        return " + ".join(f"{'' if w == 1 else f'{w:g} '}{symbol(column)}" for column, w in self.cost.items())
+
+
+class PerformanceFigure(SolvedFigure):
+    """ρ_s(τ) = |{p : t_sp ≤ τ min_s t_sp}|/P : share of problems solved within τ times the least cost of all.
+
+    Dolan & Moré (2002). At τ = 1 it says how often a strategy is the cheapest, at the right what it can solve at all.
+    """
+
+    kind: Literal["performance-profile"] = "performance-profile"
+
+    def abscissa(self, costs: Array) -> Array:
+        return ratios(costs)
+
+    def words(self) -> str:
+        return rf"$\tau$: {self.work()}, over the least of all strategies"
+
+
+class DataFigure(SolvedFigure):
+    """d_s(α) = |{p : t_sp ≤ α}|/P : share of problems solved within a budget α. Moré & Wild (2009)."""
+
+    kind: Literal["data-profile"] = "data-profile"
+
+    def abscissa(self, costs: Array) -> Array:
+        return costs
+
+    def words(self) -> str:
+        return axis_label(list(self.cost), "runs") if len(self.cost) == 1 else self.work()
+
+
+def _differing(runs: pd.DataFrame, group: Names) -> Names:
+    """Parameters that are not the same in all runs of a strategy."""
+    words = {str(name): [str(value) for value in runs[name]] for name in runs if name not in RUNS or name in group}
+    return tuple(name for name in words if name not in group and not settled(words, name, group))

@@ -1,0 +1,93 @@
+"""The one loop: every method is stopped by the same outside test, and every ending becomes a status."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from nlsolve.contracts.nonlinear_solver import NonlinearSolver
+from nlsolve.contracts.problem import NonlinearProblem
+from nlsolve.contracts.status import SolveError, Status
+from nlsolve.series import Array
+from nlsolve.solving.ledger import Audited, Ledger
+from nlsolve.solving.outcome import Outcome
+from nlsolve.solving.stopping import Budget, StoppingTest
+from nlsolve.solving.tangent import Tangent
+
+GROWTH_OF_DIVERGENCE = 1e6  # residual over the larger of its first value and its scale
+PATIENCE = 40  # steps without a new smallest residual before a method is said to stagnate
+
+
+@np.errstate(all="ignore")  # what is not finite becomes a status, not a warning
+def solve(
+    problem: NonlinearProblem,
+    solver: NonlinearSolver,
+    tangent: Tangent,
+    start: Array,
+    stop: StoppingTest,
+    budget: Budget,
+    ledger: Ledger,
+) -> Outcome:
+    """Take steps of `solver` on `problem` from `start` until the stopping test, the budget or a failure ends it."""
+    audited = Audited(problem, ledger)
+    scale = audited.scale(start)
+    before, rows = start, list[dict[str, Any]]()
+    residual_norm = np.inf
+    claimed = denied = False
+
+    def ended(status: Status, detail: str = "") -> Outcome:
+        blame: Mapping[str, float] = {}
+        if status is not Status.CONVERGED and np.isfinite(before).all():
+            blame = problem.blame(before, audited.residual(before))
+        sentence = detail or status.sentence
+        return Outcome(status, sentence, before, float(residual_norm), tuple(rows), claimed, denied, blame)
+
+    if not np.isfinite(scale):
+        return ended(
+            Status.NON_FINITE, "the forces at the first state are not finite: the law gave no finite viscosity"
+        )
+    iterator = iter(solver.steps(audited.view, tangent.view, start))
+    first = best = np.inf
+    since_best = 0
+    for number in range(budget.iterations + 1):
+        try:
+            with ledger.entry("method"):
+                step = next(iterator, None)
+        except SolveError as error:
+            denied |= residual_norm <= stop.verified
+            return ended(error.status, error.detail)
+        if step is None:
+            return ended(Status.STAGNATED, "the method stopped by itself before the stopping test was met")
+        residual_norm = float(np.linalg.norm(audited.residual(step.state))) / scale
+        difference = stop.difference(step.state, before) if number else np.nan
+        before = step.state.copy()  # a method may go on working in its array
+        rows.append(
+            {
+                "step": number,
+                "branch": tangent.branches,
+                "triangular_solves": ledger.counts["triangular_solve"],
+                "residual_norm": residual_norm,
+                "difference": difference,
+                "seconds": ledger.seconds["method"],
+                **step.notes,
+            }
+        )
+        solved = residual_norm <= stop.verified
+        claimed |= step.claim is True and not solved
+        denied |= step.claim is False and solved
+        if not np.isfinite(residual_norm):
+            return ended(Status.OUT_OF_DOMAIN if np.isfinite(step.state).all() else Status.NON_FINITE)
+        if stop.met(step, residual_norm, difference):
+            claimed |= not solved  # the test of differences speaks for the method
+            return ended(Status.CONVERGED)
+        if number == 0:
+            first = residual_norm
+        if residual_norm > GROWTH_OF_DIVERGENCE * max(1.0, first):
+            return ended(Status.DIVERGED)
+        since_best = 0 if residual_norm < best else since_best + 1
+        best = min(best, residual_norm)
+        if since_best >= PATIENCE:
+            return ended(Status.STAGNATED)
+    return ended(Status.BUDGET_SPENT)

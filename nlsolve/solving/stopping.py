@@ -1,0 +1,65 @@
+"""When is a problem solved, and what may it cost? The test outside all methods, and the budget."""
+
+from __future__ import annotations
+
+from typing import ClassVar, Literal
+
+import numpy as np
+from pydantic import Field
+
+from nlsolve.contracts.component import Component
+from nlsolve.contracts.nonlinear_solver import Step
+from nlsolve.results.verdicts import VERIFIED
+from nlsolve.series import Array
+
+
+class StoppingTest(Component):
+    """When is an increment solved?
+
+    residual : ‖R(u)‖₂ / scale ≤ tolerance, the residual asked for by the driver, off the clock. The fair test.
+    difference : ‖u_i − u_{i−1}‖ / ‖u_i‖ ≤ tolerance in the named norm, the test of iterative "Algo2" in the 2015 paper.
+    claim : the method says so itself (a_max ≥ 1 for a series, with its own η), as for "Algo1" in the 2015 paper.
+    """
+
+    noun: ClassVar[str] = "stop"
+
+    kind: Literal["residual", "difference", "claim"] = "residual"
+    tolerance: float = Field(1e-8, gt=0, description="largest relative residual or relative difference accepted")
+    norm: Literal["euclidean", "maximum", "components"] = Field(
+        "euclidean", description="of a difference: over all nodes, its largest entry, or the larger of u's and v's norm"
+    )
+
+    @property
+    def verified(self) -> float:
+        """The relative residual up to which a state is held to be a solution, whatever the method says of it."""
+        return self.tolerance if self.kind == "residual" else VERIFIED
+
+    def met(self, step: Step, residual_norm: float, difference: float) -> bool:
+        """Is this step a solution?"""
+        if self.kind == "claim":
+            return bool(step.claim)
+        return (residual_norm if self.kind == "residual" else difference) <= self.tolerance
+
+    def difference(self, state: Array, before: Array) -> float:
+        """‖u_i − u_{i−1}‖ / ‖u_i‖ in the test's norm; for "components" the larger of the two ratios."""
+        if self.norm == "components":
+            pairs = [(state[i::2], before[i::2]) for i in (0, 1)]
+            return max(_relative(u - w, u, 2) for u, w in pairs)
+        return _relative(state - before, state, np.inf if self.norm == "maximum" else 2)
+
+
+def _relative(change: Array, value: Array, order: float) -> float:
+    size = float(np.linalg.norm(value, order))
+    moved = float(np.linalg.norm(change, order))
+    return moved / size if size else (np.inf if moved else 0.0)
+
+
+class Budget(Component):
+    """What one increment may cost before it counts as failed."""
+
+    noun: ClassVar[str] = "budget"
+
+    iterations: int = Field(200, gt=0, description="iterations or series per increment")
+    pressures: int = Field(
+        60, gt=0, description="iterations of the pressure per increment, where a scene asks for them"
+    )

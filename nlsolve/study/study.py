@@ -1,0 +1,266 @@
+"""Study file -> validated `Study` -> cases: a question, components by kind, sweeps, and what to show of the results."""
+
+from __future__ import annotations
+
+import itertools
+import re
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from nlsolve.registry.problems import ABSENT, Problem, Source, StudyError, did_you_mean, problems_in
+from nlsolve.registry.registry import Registry, load_registry
+from nlsolve.registry.toml_lines import Place, lines_of
+from nlsolve.results.columns import RUNS
+from nlsolve.results.reference_error import REFERENCE
+from nlsolve.results.verdicts import VARIANT, names_settings
+from nlsolve.show.figures import FigureSpec
+from nlsolve.show.tables import TableSpec, check
+from nlsolve.study.case import SECTIONS, Case, Composer, Invalid
+from nlsolve.study.sweeps import Document, Point, Setting, Sweep, assign_all, leaves, merged, places_of, swept_places
+from nlsolve.study.timing import Timing
+
+
+class Frame(BaseModel):
+    """The parts of a study file around its components."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    question: str = Field(min_length=1, description="what the study finds out, in a sentence")
+    sweep: tuple[Sweep, ...] = ()
+    reference: dict[str, Any] | None = Field(
+        None, description="parameters that make a case the reference its velocities are compared with"
+    )
+    table: tuple[TableSpec, ...] = ()
+    figure: tuple[FigureSpec, ...] = ()
+    timing: Timing = Timing()
+    quick: dict[str, Any] = Field(default_factory=dict, description="what --quick changes")
+
+
+@dataclass(frozen=True)
+class Study:
+    """A question, the cases that answer it, and the tables and figures to show."""
+
+    name: str
+    question: str
+    cases: tuple[Case, ...]
+    tables: tuple[TableSpec, ...] = ()
+    figures: tuple[Any, ...] = ()
+    has_quick: bool = False
+    timing: Timing = field(default_factory=Timing)
+
+    @classmethod
+    def from_toml(
+        cls,
+        path: str | Path,
+        overrides: Mapping[str, Any] | None = None,
+        quick: bool = False,
+        registry: Registry | None = None,
+    ) -> Study:
+        """The study in a file. `overrides` are dotted names and values; `quick` applies the file's [quick] first."""
+        try:
+            text = Path(path).read_text(encoding="utf-8")
+            document = tomllib.loads(text)
+        except OSError as error:
+            raise StudyError(f"{path}: the study cannot be read: {error.strerror}") from error
+        except UnicodeDecodeError as error:
+            raise StudyError(f"{path}: the study is not UTF-8 text: {error.reason}") from error
+        except tomllib.TOMLDecodeError as error:
+            raise StudyError(_syntax(str(path), str(error))) from error
+        source = Source(str(path), lines_of(text))
+        return _Builder(source, document, overrides or {}, quick, registry or load_registry()).study(Path(path).stem)
+
+    @classmethod
+    def from_dict(
+        cls,
+        document: Mapping[str, Any],
+        overrides: Mapping[str, Any] | None = None,
+        quick: bool = False,
+        registry: Registry | None = None,
+        name: str = "study",
+    ) -> Study:
+        """The same from Python; sections may be components."""
+        return _Builder(Source(name), document, overrides or {}, quick, registry or load_registry()).study(name)
+
+
+class _Builder:
+    """One study on its way from a document to cases, with all that an error message wants to tell."""
+
+    def __init__(
+        self, source: Source, document: Mapping[str, Any], overrides: Mapping[str, Any], quick: bool, registry: Registry
+    ) -> None:
+        self.composer = Composer(registry)
+        self.document: Document = merged({}, document)
+        aliases = {name: source.at(place) for name, place in swept_places(self.document).items()}
+        quick_values: Document = {}
+        if quick:
+            if not isinstance(self.document.get("quick"), dict):
+                raise StudyError(f"{source.file}: the study has no [quick] section, so it cannot be run with --quick")
+            quick_values = self.document["quick"]
+            changed = swept_places(quick_values) | places_of(quick_values)
+            aliases |= {name: source.at(("quick", *place)) for name, place in changed.items()}
+        self.quick = quick
+        self.overrides = {**quick_values, **overrides}
+        self.source = Source(source.file, source.lines, aliases | {name: f"{source.file}, --set" for name in overrides})
+        self.refuse(assign_all(self.document, self.overrides))
+
+    def study(self, name: str) -> Study:
+        frame = self.frame()
+        cases = self.cases(frame)
+        tables, problems = [], []
+        for number, spec in enumerate(frame.table):
+            found = check(spec, [case.parameters for case in cases])
+            if self.quick or (self.overrides and any(problem.place[0] == "paper" for problem in found)):
+                spec = spec.with_(paper=None)  # the study is no longer the one the paper's values are for
+                found = check(spec, [case.parameters for case in cases])
+            tables.append(spec)
+            problems += [Problem(("table", number, *wrong.place), wrong.value, wrong.expected) for wrong in found]
+        known = list(dict.fromkeys([*RUNS, *(name for case in cases for name in case.parameters)]))
+        problems += [
+            Problem(("figure", number, name), column, f"no such column of the results; {did_you_mean(column, known)}")
+            for number, figure in enumerate(frame.figure)
+            for name, columns in figure.columns_of_runs().items()
+            for column in columns
+            if column not in known
+        ]
+        if not frame.timing.calibrate:
+            lines = [("table", n) for n, spec in enumerate(frame.table) if spec.crossover is not None]
+            lines += [("figure", n) for n, spec in enumerate(frame.figure) if spec.kind == "crossover"]
+            asked = "a crossover is told from unit costs: set timing = { calibrate = true }"
+            problems += [Problem(place, ABSENT, asked) for place in lines]
+        self.refuse(problems)
+        return Study(name, frame.question, cases, tuple(tables), frame.figure, bool(frame.quick), frame.timing)
+
+    def refuse(self, problems: list[Problem]) -> None:
+        self.refuse_sentences([problem.sentence(self.source) for problem in problems])
+
+    def refuse_sentences(self, sentences: list[str]) -> None:
+        if sentences:
+            raise StudyError(*dict.fromkeys(sentences))
+
+    def frame(self) -> Frame:
+        document = {name: value for name, value in self.document.items() if name not in SECTIONS}
+        unknown = [name for name in document if name not in Frame.model_fields]
+        names = [*Frame.model_fields, *SECTIONS]
+        self.refuse(
+            [Problem((name,), self.document[name], f"no such section; {did_you_mean(name, names)}") for name in unknown]
+        )
+        try:
+            frame = Frame.model_validate(document)
+        except ValidationError as error:
+            self.refuse(problems_in(error, Frame, document))
+            raise
+        swept = [name for sweep in frame.sweep for name in sweep.columns]
+        self.refuse(
+            [Problem((name,), [], "swept twice") for name in swept if swept.count(name) > 1]
+            + [
+                Problem((name,), [], f"not a parameter; {did_you_mean(name.split('.')[0], SECTIONS)}")
+                for name in swept
+                if name.split(".")[0] not in SECTIONS
+            ]
+        )
+        return frame
+
+    def cases(self, frame: Frame) -> tuple[Case, ...]:
+        cases: dict[str, Case] = {}
+        references: dict[str, Case] = {}
+        sentences: list[str] = []
+        named = {name for sweep in frame.sweep if sweep.each is not None for name in sweep.columns}
+        base = {name: value for name, value in self.document.items() if name in SECTIONS}
+        by_hand = {name: value for name, value in self.overrides.items() if name.split(".")[0] in SECTIONS}
+        root: Place = ("quick", "sweep") if self.quick and "sweep" in self.document["quick"] else ("sweep",)
+        for points in itertools.product(*(sweep.points((*root, number)) for number, sweep in enumerate(frame.sweep))):
+            try:
+                case = self.combined(base, points, by_hand, named)
+                if frame.reference is not None:
+                    reference = self.reference(frame.reference, base, points, by_hand, named)
+                    case = replace(case, reference=references.setdefault(reference.id, reference).id)
+            except _Refused as refused:
+                sentences += refused.sentences
+                continue
+            source = self.source_of(points, named, by_hand)
+            twin = cases.setdefault(case.id, case)  # what is set by hand may make two cases one
+            names = [
+                ", ".join(word for name, word in each.parameters.items() if names_settings(name))
+                for each in (twin, case)
+            ]
+            if names[0] != names[1]:
+                hand = " with what is set by hand" if by_hand else ""
+                same = f"{names[0]!r} and {names[1]!r} are one and the same case{hand}: change one of them, or drop it"
+                place = next(point.place for point in points if point.name)
+                sentences.append(Problem(place, ABSENT, same).sentence(source))
+        self.refuse_sentences(sentences)
+        cases = references | cases  # first, so that all others can be compared with them as they end
+        everyone = [case.parameters for case in cases.values()]
+        differing = {
+            name
+            for parameters in everyone
+            for name, value in parameters.items()
+            if any(name in other and other[name] != value for other in everyone)  # one kind's own defaults tell nothing
+        }
+        return tuple(
+            replace(case, swept=tuple(name for name in case.swept if name in differing)) for case in cases.values()
+        )
+
+    def combined(self, base: Document, points: tuple[Point, ...], by_hand: Mapping[str, Any], named: set[str]) -> Case:
+        """The case of one combination, the hand winning. Raises _Refused with sentences."""
+        source = self.source_of(points, named, by_hand)
+        assigned = {name: value for point in points for name, value in point.values.items()}
+        document = merged({}, base)
+        sections_first = dict(sorted(assigned.items(), key=lambda item: item[0].count(".")))
+        wrong = assign_all(document, sections_first) + assign_all(document, by_hand)
+        if wrong:
+            raise _Refused([problem.sentence(source) for problem in wrong])
+        try:
+            return self.composer.case(document, points)
+        except Invalid as invalid:
+            raise _Refused([problem.sentence(source) for problem in invalid.problems]) from invalid
+
+    def reference(
+        self,
+        table: Mapping[str, Any],
+        base: Document,
+        points: tuple[Point, ...],
+        by_hand: Mapping[str, Any],
+        named: set[str],
+    ) -> Case:
+        """The same combination as the reference has it: what its table sets, nobody else does."""
+        column = next((point.column for point in points if point.name), VARIANT)
+        made = Setting.model_validate({"name": REFERENCE, **table}).point((REFERENCE,), column)
+
+        def others(values: Mapping[str, Any]) -> dict[str, Any]:
+            return {
+                name: value
+                for name, value in values.items()
+                if not any(f"{name}.".startswith(f"{settled}.") for settled in made.values)
+            }
+
+        left = tuple(replace(point, values=others(point.values), name="") for point in points)
+        if not any(point.name for point in points):
+            made = replace(made, name="")
+        return self.combined(base, (*left, made), others(by_hand), named | set(made.values))
+
+    def source_of(self, points: tuple[Point, ...], named: set[str], by_hand: Mapping[str, Any]) -> Source:
+        """Where the values of one combination were written; the hand wins here too."""
+        hand = dict(leaves(by_hand))
+        known = {name: where for name, where in self.source.aliases.items() if name in hand or name not in named}
+        mine = {name: place for point in points for name, place in point.places.items() if name not in hand}
+        return replace(self.source, aliases=known | {name: self.source.at(place) for name, place in mine.items()})
+
+
+class _Refused(Exception):
+    """A combination that does not make a case, in sentences with their places."""
+
+    def __init__(self, sentences: list[str]) -> None:
+        super().__init__()
+        self.sentences = sentences
+
+
+def _syntax(path: str, message: str) -> str:
+    found = re.search(r"\(at line (\d+), column (\d+)\)", message)
+    where = f", line {found[1]}, column {found[2]}" if found else ""
+    return f"{path}{where}: not valid TOML: {message.split(' (at ')[0]}"

@@ -1,0 +1,193 @@
+"""What is varied and what is set by hand: sweeps, overrides, and how they change a study's document."""
+
+from __future__ import annotations
+
+import itertools
+import tomllib
+from collections.abc import Iterator, Mapping
+from copy import deepcopy
+from dataclasses import dataclass, field
+from typing import Any
+
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+from nlsolve.contracts.component import Component
+from nlsolve.registry.problems import Problem, StudyError
+from nlsolve.registry.toml_lines import Place
+from nlsolve.results.aggregates import COUNT, WITHIN
+from nlsolve.results.verdicts import OUTCOME, SOLVED, SPEEDUP, VARIANT, names_settings
+
+Document = dict[str, Any]
+
+
+@dataclass(frozen=True)
+class Point:
+    """One choice of a sweep: what it sets. A named setting also knows the column of `runs` its name goes into, and
+    where it and each of its values are written.
+    """
+
+    values: dict[str, Any]
+    name: str = ""
+    column: str = VARIANT
+    place: Place = ()
+    places: Mapping[str, Place] = field(default_factory=dict)
+
+
+class Setting(BaseModel):
+    """A named table of assignments; one without any is the study as it is."""
+
+    model_config = ConfigDict(frozen=True, extra="allow")
+
+    name: str = Field(min_length=1, description="what the setting is called in `variant`")
+
+    def point(self, place: Place = (), column: str = VARIANT) -> Point:
+        """What it sets; `place` is where it is written."""
+        table = self.model_extra or {}
+        places = {name: (*place, *inside) for name, inside in places_of(table, whole_kinds=True).items()}
+        return Point(dict(leaves(table, whole_kinds=True)), self.name, column, place, places)
+
+
+class Sweep(BaseModel):
+    """Values for parameters: every combination (`grid`), side by side (`zip`), or named settings one by one (`each`).
+
+    grid = { law.index = [1.0, 0.5], scene.penalty = [0.0, 1e2] }                        four points
+    zip = { law.index = [1.0, 0.5], scene.penalty = [0.0, 1e2] }                         two points
+    each = [ { name = "p = 40", solver = { kind = "anm", order = 40 } },
+             { name = "ε₀ = 10", "law.regularization" = 10.0 }, { name = "as it is" } ]  three points
+
+    A table with a `kind` replaces the section it is for. The names of the settings become the column `variant` of
+    `runs`, joined by commas where several sweeps have them, or the column that the sweep's `name` asks for; they are
+    no part of a case's identity.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    grid: dict[str, list[Any]] | None = Field(None, description="parameter -> values; all combinations")
+    zip: dict[str, list[Any]] | None = Field(None, description="parameter -> values; the first of each, the second, …")
+    each: tuple[Setting, ...] | None = Field(None, description="named tables of assignments; one after the other")
+    name: str = Field(
+        VARIANT, pattern=r"^[A-Za-z][A-Za-z0-9_-]*$", description="column of `runs` for the names of each"
+    )
+
+    @model_validator(mode="before")
+    @classmethod
+    def _flatten(cls, data: Any) -> Any:
+        """{ solver.order = […] } and { "solver.order" = […] } mean the same."""
+        if not isinstance(data, dict):
+            return data
+        return {mode: dict(leaves(table)) if isinstance(table, dict) else table for mode, table in data.items()}
+
+    @model_validator(mode="after")
+    def _values(self) -> Sweep:
+        if sum(mode is not None for mode in (self.grid, self.zip, self.each)) != 1:
+            raise ValueError("a sweep has one of grid, zip and each")
+        if not names_settings(self.name) or self.name in (OUTCOME, SOLVED, SPEEDUP, WITHIN, COUNT):
+            raise ValueError(f"name = {self.name!r} is a column of the results already; choose another")
+        if self.each is None and self.name != VARIANT:
+            raise ValueError(f"name = {self.name!r} is for the names of each, and there are none; drop it")
+        empty = [name for name, values in self.columns.items() if not values]
+        if empty or not (self.columns or self.each):
+            raise ValueError(f"{empty[0]!r} has no values" if empty else "nothing is swept")
+        if self.zip is not None and len({len(values) for values in self.zip.values()}) > 1:
+            lengths = ", ".join(f"{name!r} has {len(values)}" for name, values in self.zip.items())
+            raise ValueError(f"zip needs lists of one length; {lengths}")
+        names = [setting.name for setting in self.each or ()]
+        twice = [name for name in names if names.count(name) > 1]
+        if twice:
+            raise ValueError(f"{names.count(twice[0])} settings are called {twice[0]!r}; give each its own name")
+        return self
+
+    @property
+    def columns(self) -> dict[str, list[Any]]:
+        """Values by parameter."""
+        if self.each is None:
+            return self.grid or self.zip or {}
+        found: dict[str, list[Any]] = {}
+        for setting in self.each:
+            for name, value in setting.point().values.items():
+                found.setdefault(name, []).append(value)
+        return found
+
+    def points(self, place: Place = ()) -> list[Point]:
+        """What is set, point by point; `place` is where the sweep is written."""
+        if self.each is not None:
+            return [setting.point((*place, "each", number), self.name) for number, setting in enumerate(self.each)]
+        rows = (
+            itertools.product(*self.columns.values()) if self.zip is None else zip(*self.columns.values(), strict=True)
+        )
+        return [Point(dict(zip(self.columns, row, strict=True))) for row in rows]
+
+
+def assign_all(document: Document, values: Mapping[str, Any]) -> list[Problem]:
+    """Set dotted names in a document; a problem for each that leads through something that is not a table."""
+    problems = []
+    for name, value in values.items():
+        *parents, last = name.split(".")
+        table = document
+        for depth, part in enumerate(parents):
+            table = table.setdefault(part, {})
+            if not isinstance(table, dict):
+                above = ".".join(parents[: depth + 1])
+                problems.append(Problem((name,), value, f"{above!r} is not a table"))
+                break
+        else:
+            table[last] = merged(table.get(last), value)
+    return problems
+
+
+def merged(old: Any, new: Any) -> Any:
+    """`new` over `old`: a table with a `kind` replaces what was there, one without is merged into it."""
+    if isinstance(new, Component):
+        return new.model_dump()
+    if isinstance(new, Mapping):
+        under = old if isinstance(old, dict) and "kind" not in new else {}
+        return {**under, **{name: merged(under.get(name), value) for name, value in new.items()}}
+    return deepcopy(new)
+
+
+def leaves(table: Mapping[str, Any], above: str = "", whole_kinds: bool = False) -> Iterator[tuple[str, Any]]:
+    """Dotted name and value of everything that is not itself a table, or (`whole_kinds`) is one with a `kind`."""
+    for name, value in table.items():
+        if isinstance(value, Mapping) and value and not (whole_kinds and "kind" in value):
+            yield from leaves(value, f"{above}{name}.", whole_kinds)
+        else:
+            yield f"{above}{name}", value
+
+
+def swept_places(document: Document) -> dict[str, Place]:
+    """Where in a document every swept parameter has its values, whatever else is wrong with the document."""
+    sweeps = document.get("sweep")
+    return {
+        name: ("sweep", number, mode, *inside, *place)
+        for number, sweep in enumerate(sweeps if isinstance(sweeps, list) else [])
+        for mode, written in (sweep.items() if isinstance(sweep, dict) else ())
+        for inside, table in _tables_in(written)
+        for name, place in places_of(table, whole_kinds=mode == "each").items()
+        if name != "name"
+    }
+
+
+def _tables_in(written: Any) -> list[tuple[Place, Mapping[str, Any]]]:
+    """A table, or the tables of a list, each with its place; nothing else."""
+    found = enumerate(written) if isinstance(written, list) else [((), written)]
+    return [((place,) if isinstance(place, int) else (), table) for place, table in found if isinstance(table, dict)]
+
+
+def places_of(table: Mapping[str, Any], whole_kinds: bool = False) -> dict[str, Place]:
+    """Dotted names in a table, and the keys they are written with: "a.b" is either a."b" or a.b."""
+    names = [name for name, _ in leaves(table, whole_kinds=whole_kinds)]
+    return {name: (name,) if name in table else tuple(name.split(".")) for name in names}
+
+
+def parse_assignments(texts: list[str]) -> dict[str, Any]:
+    """`key=value` as given to --set; a value that is not TOML is a string. Raises StudyError."""
+    parsed = {}
+    for text in texts:
+        name, equals, value = text.partition("=")
+        if not (equals and name.strip()):
+            raise StudyError(f"--set {text}: expected key=value, such as solver.order=20")
+        try:
+            parsed[name.strip()] = tomllib.loads(f"value = {value}")["value"]
+        except tomllib.TOMLDecodeError:
+            parsed[name.strip()] = value.strip()
+    return parsed

@@ -1,0 +1,56 @@
+"""A u + sinh u = b : a problem small enough to try any method on, and LAPACK to solve its linear systems."""
+
+from __future__ import annotations
+
+from collections import Counter
+from typing import Any, ClassVar
+
+import numpy as np
+import scipy.linalg
+import scipy.sparse as sp
+
+from nlsolve.contracts.linear_solver import Factors, LinearSolver
+from nlsolve.contracts.problem import Expansion, NonlinearProblem
+from nlsolve.series import Array, Series
+
+
+class DenseLU(LinearSolver):
+    """LAPACK, for small problems. `asked` counts, beside any ledger, what all instances have been asked for."""
+
+    asked: ClassVar[Counter[str]] = Counter()
+
+    def factorize(self, matrix: Any, previous: Factors | None = None) -> Factors:
+        self.asked["factorization"] += 1
+        return _DenseFactors(matrix)
+
+
+class _DenseFactors(Factors):
+    def __init__(self, matrix: Any) -> None:
+        self._lu = scipy.linalg.lu_factor(matrix.toarray())
+
+    def solve(self, rhs: Array) -> Array:
+        DenseLU.asked["triangular_solve"] += 1
+        return scipy.linalg.lu_solve(self._lu, rhs)
+
+
+class SmallProblem(NonlinearProblem):
+    """A u + sinh u = A u* + sinh u*, tridiagonal A: one solution u*, `solution`, which any method should find."""
+
+    solution = np.sin(np.arange(1.0, 13.0))
+    matrix = sp.diags_array([-np.ones(11), 4.0 * np.ones(12), -np.ones(11)], offsets=[-1, 0, 1], format="csr")
+
+    def residual(self, u: Any) -> Any:
+        return self.matrix @ u + np.sinh(u) - (self.matrix @ self.solution + np.sinh(self.solution))
+
+    def jacobian(self, u: Array) -> Any:
+        DenseLU.asked["jacobian"] += 1
+        return (self.matrix + sp.diags_array(np.cosh(u))).tocsr()
+
+    def secant(self, u: Array) -> Any:
+        DenseLU.asked["jacobian"] += 1
+        ratio = np.divide(np.sinh(u), u, out=np.ones_like(u), where=u != 0.0)
+        return (self.matrix + sp.diags_array(ratio)).tocsr()
+
+    def expand(self, u: Array) -> Expansion:
+        path = Series(u)
+        return Expansion(path, self.residual(path))

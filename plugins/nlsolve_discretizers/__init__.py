@@ -1,0 +1,15 @@
+"""Collocation by moving least squares and by radial basis functions, and linear triangles to compare with."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from nlsolve.plugin import Component, hookimpl
+from nlsolve_discretizers.linear_triangles import LinearTriangles
+from nlsolve_discretizers.moving_least_squares import MovingLeastSquares
+from nlsolve_discretizers.radial_basis import RadialBasis
+
+
+@hookimpl
+def nlsolve_components() -> Iterable[type[Component]]:
+    return [MovingLeastSquares, RadialBasis, LinearTriangles]

@@ -1,0 +1,198 @@
+"""B and S by collocation: strain rates at stress points from nodes, and what returns the stress there to the nodes."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import Any, ClassVar, Literal
+
+import numpy as np
+from pydantic import Field
+
+from nlsolve.plugin import Cloud, Discretizer, Operators, SolveError
+from nlsolve_discretizers.conservation import conserving
+from nlsolve_discretizers.weights.assembly import Gradient, sparse_rows
+from nlsolve_discretizers.weights.diagnostics import diagnosis
+from nlsolve_discretizers.weights.least_squares import Derivatives, monomials
+from nlsolve_discretizers.weights.neighbours import Neighbours
+from nlsolve_discretizers.weights.supports import Supports
+from nlsolve_discretizers.weights.triangles import Triangles
+
+AT_ONCE = 1024  # targets whose local systems are in the cache together
+VALUE, GRADIENT = ((0, 0),), ((1, 0), (0, 1))
+
+
+class Collocation(Discretizer):
+    """Derivatives of first order only, once each way, by weights at scattered neighbours.
+
+    points : between, strain rates and stresses live at the midpoints of the cloud's Delaunay edges, the default: no
+             second derivative and no odd-even mode; or nodes, the composed form of the 2015 paper, kept to be compared
+             with: it decouples neighbouring nodes and fails for n → 0.
+    form :   strong, the divergence of stress is collocated at the nodes; or conservative, S = −Bᵀ A with gradients
+             corrected for the discrete divergence theorem: a symmetric tangent, and a residual with a potential.
+
+    The volumetric term has points of its own, about one a node, so that the penalty does not lock: patches of two
+    Delaunay triangles ("pairs"), or the nodes with collocation both ways ("nodes").
+    """
+
+    points: Literal["between", "nodes"] = Field("between", description="where strain rates and stresses are taken")
+    form: Literal["strong", "conservative"] = Field("strong", description="how stresses act on the nodes")
+    volume_points: Literal["pairs", "nodes"] = Field("pairs", description="where the dilatation is taken")
+    degree: int = Field(2, ge=1, le=4, description="degree of the polynomials")
+    balanced: bool = Field(True, description="supports grow until every quadrant that has nodes nearby is served")
+
+    default_counterpart: ClassVar = {"kind": "delaunay"}
+
+    weak: ClassVar[float] = 1e-3
+    """Quality of a support below which it is enlarged."""
+    growths: ClassVar[int] = 3
+    """How often a weak support is enlarged, by half each time, before it is refused."""
+
+    @abstractmethod
+    def supports(self, sources: np.ndarray, targets: np.ndarray, role: str, cloud: Cloud | None) -> Supports:
+        """Neighbours for the weights in a role: "strain", "force" or "volume" on a cloud, "value" anywhere."""
+
+    @abstractmethod
+    def local_weights(
+        self, offsets: np.ndarray, radius: np.ndarray, derivatives: Derivatives
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Weights (D, T, k) of D derivatives for neighbours at `offsets` (T, k, 2), and the quality (T,) of the
+        supports: 0 for one that determines nothing.
+        """
+
+    @abstractmethod
+    def refusal(self, count: int, place: np.ndarray, quality: float) -> SolveError | None:
+        """What is wrong with the worst support, of `count` neighbours around `place`; None when it will do."""
+
+    def weights(
+        self,
+        sources: np.ndarray,
+        targets: np.ndarray,
+        role: str,
+        derivatives: Derivatives,
+        cloud: Cloud | None = None,
+        kept: Supports | None = None,
+    ) -> tuple[Supports, np.ndarray]:
+        """Supports and weights (D, T, k) for `derivatives`; supports are found unless `kept`, weak ones are enlarged.
+
+        Raises SolveError naming the place of a support that stays weak.
+        """
+        supports = self.supports(sources, targets, role, cloud) if kept is None else kept.moved(sources, targets)
+        quality = np.empty(len(targets))
+        found = np.zeros((len(derivatives), *supports.index.shape))
+        renew = np.arange(len(targets))
+        for attempt in range(self.growths + 1):
+            for count, which in _batches(supports.count, renew):
+                offsets = sources[supports.index[which, :count]] - targets[which][:, None]
+                found[:, which, :count], quality[which] = self.local_weights(
+                    offsets, supports.radius[which], derivatives
+                )
+            renew = np.flatnonzero(~(quality >= self.weak))
+            larger = np.minimum(supports.count[renew] + (supports.count[renew] + 1) // 2, len(sources) - 1)
+            if attempt == self.growths or not (larger > supports.count[renew]).any():
+                break
+            supports = supports.replaced(renew, Supports.nearest(sources, targets[renew], larger))
+            found = np.pad(found, ((0, 0), (0, 0), (0, supports.index.shape[1] - found.shape[2])))
+            found[:, renew] = 0.0
+        worst = int(np.nan_to_num(quality, nan=0.0).argmin())
+        error = self.refusal(int(supports.count[worst]), targets[worst], float(quality[worst]))
+        if error is not None:
+            raise error
+        return supports, found
+
+    def operators(self, cloud: Cloud, volumetric: bool) -> Operators:
+        """B, S and, when asked for, B_θ, S_θ."""
+        return self._operators(Neighbours(Triangles.of(cloud)), volumetric)
+
+    def moved(self, operators: Operators, cloud: Cloud) -> Operators | None:
+        """With the same triangles, patches and supports, unless a triangle is turned inside out."""
+        near = operators.neighbours.moved_to(cloud)
+        return self._operators(near, operators.dilatation is not None) if near.triangles.upright else None
+
+    def _operators(self, near: Neighbours, volumetric: bool) -> Operators:
+        build = self._conservative if self.form == "conservative" else self._strong
+        return replace(build(near, volumetric), neighbours=near)
+
+    def _strong(self, near: Neighbours, volumetric: bool) -> Operators:
+        triangles, cloud = near.triangles, near.triangles.cloud
+        nodes, interior = cloud.nodes, cloud.interior
+        points = triangles.midpoints() if self.points == "between" else nodes
+        strain = self._gradient(nodes, points, "strain", cloud, near.supports).strain(len(nodes))
+        force = self._gradient(points, nodes[interior], "force", cloud, near.supports).divergence_of_stress(len(points))
+        if not volumetric:
+            return Operators(strain, force, points)
+        if self.volume_points == "pairs":
+            patches = triangles.patches()
+            return Operators(strain, force, points, patches.dilatation, patches.force_per_area(), patches.centres)
+        gradient = self._gradient(nodes, nodes, "volume", cloud, near.supports)
+        dilatation = gradient.divergence(len(nodes))
+        return Operators(strain, force, points, dilatation, gradient.at(interior).of_pressure(len(nodes)), nodes)
+
+    def _conservative(self, near: Neighbours, volumetric: bool) -> Operators:
+        triangles, cloud = near.triangles, near.triangles.cloud
+        nodes = cloud.nodes
+        points, areas = triangles.diamonds() if self.points == "between" else (nodes, triangles.node_areas)
+        gradient = conserving(cloud, points, areas, self._gradient(nodes, points, "strain", cloud, near.supports))
+        strain = gradient.strain(len(nodes))
+        if not volumetric:
+            return Operators.conservative(cloud, strain, points, areas, triangles.node_areas)
+        if self.volume_points == "pairs":
+            patches = triangles.patches()
+            volume = (patches.dilatation, patches.centres, patches.areas)
+        else:
+            gradient = conserving(
+                cloud, nodes, triangles.node_areas, self._gradient(nodes, nodes, "volume", cloud, near.supports)
+            )
+            volume = (gradient.divergence(len(nodes)), nodes, triangles.node_areas)
+        return Operators.conservative(cloud, strain, points, areas, triangles.node_areas, *volume)
+
+    def gradient(self, cloud: Cloud) -> tuple[Any, Any]:
+        """∂/∂x and ∂/∂y at the nodes."""
+        return self._gradient(cloud.nodes, cloud.nodes, "volume", cloud).matrices(len(cloud.nodes))
+
+    def values(self, sources: np.ndarray, targets: np.ndarray) -> Any:
+        """Sparse (T, N) matrix of values."""
+        supports, (value,) = self.weights(sources, targets, "value", VALUE)
+        return sparse_rows([[(supports.index, value)]], (len(targets), len(sources)))
+
+    def diagnostics(self, cloud: Cloud) -> list[dict[str, Any]]:
+        """A row each for the strain, force and volume weights of a cloud."""
+        points = Triangles.of(cloud).midpoints() if self.points == "between" else cloud.nodes
+        roles = {
+            "strain": (cloud.nodes, points),
+            "force": (points, cloud.nodes[cloud.interior]),
+            "volume": (cloud.nodes, cloud.nodes),
+        }
+        rows = []
+        for role, (sources, targets) in roles.items():
+            plain = self.with_(balanced=False).supports(sources, targets, role, cloud)
+            supports, weights = self.weights(sources, targets, role, GRADIENT, cloud)
+            row = diagnosis(sources, targets, supports, weights, self.degree)
+            rows.append({"operator": role, **row, "grown": int((supports.count > plain.count).sum())})
+        return rows
+
+    def _gradient(
+        self,
+        sources: np.ndarray,
+        targets: np.ndarray,
+        role: str,
+        cloud: Cloud,
+        found: dict[str, Supports] | None = None,
+    ) -> Gradient:
+        """Supports are taken from those `found` before, and put there."""
+        found = {} if found is None else found
+        found[role], (dx, dy) = self.weights(sources, targets, role, GRADIENT, cloud, found.get(role))
+        return Gradient(found[role].index, dx, dy)
+
+
+def _batches(counts: np.ndarray, targets: np.ndarray) -> Iterator[tuple[int, np.ndarray]]:
+    """The targets (a part of all) that have equally many neighbours, AT_ONCE or fewer at a time."""
+    for count in np.unique(counts[targets]):
+        alike = targets[counts[targets] == count]
+        yield from ((int(count), alike[begin : begin + AT_ONCE]) for begin in range(0, len(alike), AT_ONCE))
+
+
+def least_count(degree: int) -> int:
+    """Number of monomials up to the degree: a support needs as many neighbours."""
+    return len(monomials(degree))

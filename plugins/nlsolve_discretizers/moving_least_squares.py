@@ -1,0 +1,60 @@
+"""Collocation by moving least squares."""
+
+from __future__ import annotations
+
+from typing import Literal, Self
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from nlsolve.plugin import Cloud, SolveError, Status
+from nlsolve_discretizers.collocation import Collocation, least_count
+from nlsolve_discretizers.weights.least_squares import Derivatives, fit
+from nlsolve_discretizers.weights.supports import Supports
+
+SMALLEST_PIVOT = 1e-8  # of R, relative to its column: below, the support does not determine the polynomial
+
+
+class MovingLeastSquares(Collocation):
+    """Polynomials fitted to the neighbours with weights that fall with distance (Lancaster & Salkauskas 1981)."""
+
+    kind: Literal["mls"] = "mls"
+    support: int = Field(10, ge=3, description="nodes around a strain point")
+    force_support: int = Field(12, ge=3, description="stress points around a node")
+    volume_support: int = Field(20, ge=3, description="nodes around a volume point at a node")
+    radius: float | None = Field(None, gt=0, description="influence radius in place of the counts [mm]")
+    weight: Literal["gaussian", "quartic", "spline"] = Field("gaussian", description="weight function of the distance")
+    shape: float = Field(3.0, gt=0, description="of the gaussian: exp(−(shape · distance/radius)²)")
+
+    @model_validator(mode="after")
+    def _enough_neighbours(self) -> Self:
+        least = least_count(self.degree)
+        for name in ("support", "force_support", "volume_support"):
+            if self.radius is None and getattr(self, name) < least:
+                raise ValueError(
+                    f"{name} = {getattr(self, name)}: polynomials of degree {self.degree} need at least {least} points"
+                )
+        return self
+
+    def supports(self, sources: np.ndarray, targets: np.ndarray, role: str, cloud: Cloud | None) -> Supports:
+        """By count or by radius; values have the support of strains."""
+        if self.radius is not None:
+            return Supports.within(sources, targets, self.radius)
+        count = {"force": self.force_support, "volume": self.volume_support}.get(role, self.support)
+        return Supports.nearest(sources, targets, count, self.balanced)
+
+    def local_weights(
+        self, offsets: np.ndarray, radius: np.ndarray, derivatives: Derivatives
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Least squares; the quality of a support is its smallest pivot."""
+        return fit(offsets, radius, self.degree, derivatives, self.weight, self.shape)
+
+    def refusal(self, count: int, place: np.ndarray, quality: float) -> SolveError | None:
+        """The polynomial must be determined."""
+        if quality > SMALLEST_PIVOT:
+            return None
+        return SolveError(
+            Status.BAD_CLOUD,
+            f"the {count} neighbours of the point ({place[0]:.6g}, {place[1]:.6g}) do not determine a polynomial of "
+            f"degree {self.degree}: widen the supports or lower the degree",
+        )

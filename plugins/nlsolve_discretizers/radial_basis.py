@@ -1,0 +1,75 @@
+"""Collocation by radial basis functions on local supports (RBF-FD)."""
+
+from __future__ import annotations
+
+from typing import ClassVar, Literal, Self
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from nlsolve.plugin import Cloud, SolveError, Status
+from nlsolve_discretizers.collocation import Collocation, least_count
+from nlsolve_discretizers.weights.least_squares import Derivatives
+from nlsolve_discretizers.weights.radial import interpolate, kernel
+from nlsolve_discretizers.weights.supports import Supports
+
+ILL_CONDITIONED = 1e-14  # reciprocal condition number of a local system whose solution is noise
+AT_BOUNDARIES = 1.5  # size of the supports that hold a boundary node, over that of the others
+
+
+class RadialBasis(Collocation):
+    """Kernels and polynomials that interpolate the neighbours: weights for strains, forces and values.
+
+    phs, r^power, has no shape to tune; gaussian exp(−ε² r²), multiquadric √(1 + ε² r²) and wendland (1 − ε r)⁴ (4 ε r
+    + 1) have ε = shape over the spacing of the support. The flatter a kernel, the worse the local systems are
+    conditioned: past working precision they are refused, not solved.
+    """
+
+    kind: Literal["rbf"] = "rbf"
+    kernel: Literal["phs", "gaussian", "multiquadric", "wendland"] = Field("phs", description="the radial function")
+    power: Literal[3, 5, 7] = Field(3, description="of the distance, in polyharmonic splines")
+    shape: float = Field(0.3, gt=0, description="ε times the spacing, of the other kernels")
+    support: int | None = Field(None, ge=3, description="neighbours inside; absent: twice the number of polynomials")
+
+    weak: ClassVar[float] = ILL_CONDITIONED
+
+    @model_validator(mode="after")
+    def _enough_neighbours(self) -> Self:
+        least = least_count(self.degree)
+        if self.support is not None and self.support < least:
+            raise ValueError(
+                f"support = {self.support}: polynomials of degree {self.degree} need at least {least} points"
+            )
+        return self
+
+    def supports(self, sources: np.ndarray, targets: np.ndarray, role: str, cloud: Cloud | None) -> Supports:
+        """The same number for every role, half as many more where the target is about as near to a wall as to nodes."""
+        count = self.support or 2 * least_count(self.degree)
+        supports = Supports.nearest(sources, targets, count, self.balanced)
+        if cloud is None:
+            return supports
+        wall = Supports.nearest(cloud.nodes[cloud.boundary], targets, 1)
+        near = np.flatnonzero(
+            np.linalg.norm(cloud.nodes[cloud.boundary][wall.index[:, 0]] - targets, axis=1) < 0.5 * supports.radius
+        )
+        larger = Supports.nearest(sources, targets[near], int(AT_BOUNDARIES * count), self.balanced)
+        return supports.replaced(near, larger)
+
+    def local_weights(
+        self, offsets: np.ndarray, radius: np.ndarray, derivatives: Derivatives
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Interpolation; the quality of a support is the reciprocal condition number of its system."""
+        radius_in_spacings = (offsets.shape[1] / np.pi) ** 0.5
+        phi = kernel(self.kernel, self.power, self.shape * radius_in_spacings)
+        return interpolate(offsets, radius, self.degree, derivatives, phi)
+
+    def refusal(self, count: int, place: np.ndarray, quality: float) -> SolveError | None:
+        """The local system must be solvable in working precision."""
+        if quality >= ILL_CONDITIONED:
+            return None
+        way_out = "widen the supports" if self.kernel == "phs" else "raise discretizer.shape or use the kernel phs"
+        return SolveError(
+            Status.ILL_CONDITIONED,
+            f"the kernel {self.kernel!r} on the {count} neighbours of the point ({place[0]:.6g}, {place[1]:.6g}) has a "
+            f"condition number of {1.0 / max(quality, 1e-300):.0e}: {way_out}",
+        )

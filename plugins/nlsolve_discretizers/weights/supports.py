@@ -1,0 +1,109 @@
+"""Which of the sources serve a target: the nearest ones, or all within a radius, more where they lie to one side.
+
+T targets, S sources, k the largest number of neighbours.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from nlsolve.plugin import SolveError, Status
+
+REACH = 1.5  # times the distance of the farthest neighbour: a quadrant whose nearest source lies beyond is left empty
+
+
+@dataclass(frozen=True)
+class Supports:
+    """The neighbours of T targets among the sources, nearest first.
+
+    index : (T, k); those of target t are its first count[t] columns.
+    count : (T,).
+    radius : (T,) [mm], half-way to the first source that is no neighbour.
+    farthest : (T,) [mm], distance of the last neighbour.
+    """
+
+    index: np.ndarray
+    count: np.ndarray
+    radius: np.ndarray
+    farthest: np.ndarray
+
+    @classmethod
+    def nearest(
+        cls, sources: np.ndarray, targets: np.ndarray, count: int | np.ndarray, balanced: bool = False
+    ) -> Supports:
+        """The `count` nearest sources, one number or (T,); `balanced` ones grow, to twice that at most, until every
+        quadrant around the target that has a source within REACH is served.
+        """
+        counts = np.broadcast_to(count, len(targets))
+        largest = int(np.max(count, initial=1))
+        if len(sources) <= largest:
+            raise SolveError(
+                Status.BAD_CLOUD, f"a support of {largest} neighbours was asked for among {len(sources)} points"
+            )
+        tree = cKDTree(sources)
+        distance, index = tree.query(targets, np.arange(1, largest + 2))
+        plain = cls._of(distance, index, counts)
+        if not balanced:
+            return plain
+        offsets = sources[index[:, :largest]] - targets[:, None]
+        neighbour = np.arange(largest) < counts[:, None]
+        served = np.all([(inside & neighbour).any(axis=1) for inside in _quadrants(offsets)], axis=0)
+        lopsided = np.flatnonzero(~served)
+        most = min(2 * largest, len(sources) - 1)
+        distance, index = tree.query(targets[lopsided], np.arange(1, most + 2))
+        offsets = sources[index[:, :most]] - targets[lopsided][:, None]
+        return plain.replaced(lopsided, cls._of(distance, index, _balanced(offsets, distance, counts[lopsided])))
+
+    @classmethod
+    def _of(cls, distance: np.ndarray, index: np.ndarray, counts: np.ndarray) -> Supports:
+        """From all that a tree found, one more than wanted at least."""
+        row = np.arange(len(counts))
+        farthest, next_one = distance[row, counts - 1], distance[row, counts]
+        # On a regular grid the two tie, and a source on the rim would weigh nothing: the rim lies just beyond it.
+        radius = np.maximum(0.5 * (farthest + next_one), 1.001 * farthest)
+        return cls(index[:, : int(counts.max(initial=1))], counts, radius, farthest)
+
+    @classmethod
+    def within(cls, sources: np.ndarray, targets: np.ndarray, radius: float) -> Supports:
+        """All sources nearer than `radius`."""
+        tree = cKDTree(sources)
+        count = np.maximum(tree.query_ball_point(targets, radius, return_length=True), 1)
+        distance, index = tree.query(targets, np.arange(1, int(count.max()) + 1))
+        farthest = distance[np.arange(len(targets)), count - 1]
+        return cls(index, count, np.full(len(targets), radius), farthest)
+
+    def moved(self, sources: np.ndarray, targets: np.ndarray) -> Supports:
+        """The same neighbours at other places; radii change with the farthest of them, so that no weight jumps."""
+        distance = np.linalg.norm(sources[self.index] - targets[:, None], axis=2)
+        farthest = np.where(np.arange(distance.shape[1]) < self.count[:, None], distance, 0.0).max(axis=1)
+        return replace(self, radius=self.radius * farthest / self.farthest, farthest=farthest)
+
+    def replaced(self, which: np.ndarray, others: Supports) -> Supports:
+        """These supports, with those of the targets `which` replaced by `others`."""
+        width = max(self.index.shape[1], others.index.shape[1])
+        index = np.pad(self.index, ((0, 0), (0, width - self.index.shape[1])))
+        index[which, : others.index.shape[1]] = others.index
+        count, radius, farthest = self.count.copy(), self.radius.copy(), self.farthest.copy()
+        count[which], radius[which], farthest[which] = others.count, others.radius, others.farthest
+        return Supports(index, count, radius, farthest)
+
+
+def _quadrants(offsets: np.ndarray) -> list[np.ndarray]:
+    """Which of the offsets (T, k, 2) lie in each closed quadrant, (T, k) each."""
+    x, y = offsets[..., 0], offsets[..., 1]
+    return [(x >= 0) & (y >= 0), (x <= 0) & (y >= 0), (x <= 0) & (y <= 0), (x >= 0) & (y <= 0)]
+
+
+def _balanced(offsets: np.ndarray, distance: np.ndarray, counts: np.ndarray) -> np.ndarray:
+    """Counts (T,) that reach the nearest source of every quadrant not yet served, for offsets (T, most, 2)."""
+    row = np.arange(len(counts))
+    rim = REACH * distance[row, counts - 1]
+    needed = counts.copy()
+    for quadrant in _quadrants(offsets):
+        first = quadrant.argmax(axis=1)
+        reachable = quadrant[row, first] & (distance[row, first] <= rim)
+        needed = np.where(reachable, np.maximum(needed, first + 1), needed)
+    return needed

@@ -1,0 +1,186 @@
+"""The Delaunay triangles of a cloud: their edges' midpoints, and merged pairs of them as volume points.
+
+The mean of div v over a patch of two linear triangles is taken at about one patch per node; a volumetric penalty on
+every triangle or strain point would lock. S_θ = −A_i⁻¹ B_θᵀ A, the conservative partner of B_θ, keeps the penalty
+semi-definite, so that no λ can make the tangent singular, and a constant pressure exerts no force.
+
+Linear triangles themselves are the smallest conservative discretisation: ∇φ of hat functions, one point a triangle.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+from scipy.spatial import Delaunay, QhullError
+
+from nlsolve.plugin import Cloud, SolveError, Status
+
+
+@dataclass(frozen=True)
+class Triangles:
+    """Triangles (T, 3) of a cloud, counter-clockwise, without those that span a hole or lie along a wall.
+
+    found : the same triangles on the cloud they were found on, when its nodes have moved since.
+    """
+
+    cloud: Cloud
+    corners: np.ndarray
+    found: Triangles | None = None
+
+    @classmethod
+    def of(cls, cloud: Cloud) -> Triangles:
+        """Delaunay's triangulation, less the triangles whose three nodes lie on one and the same boundary."""
+        try:
+            corners = Delaunay(cloud.nodes).simplices
+        except QhullError as error:
+            raise SolveError(Status.BAD_CLOUD, "the nodes lie on one line: they span no triangles") from error
+        group = np.zeros(len(cloud.nodes), dtype=int)
+        for number, members in enumerate(cloud.boundaries.values(), start=1):
+            group[members] = number
+        groups = group[corners]
+        along_wall = (groups[:, 0] > 0) & (groups[:, 0] == groups[:, 1]) & (groups[:, 0] == groups[:, 2])
+        triangles = cls(cloud, corners[~along_wall])
+        if np.bincount(triangles.corners.ravel(), minlength=len(group))[cloud.interior].min(initial=1) == 0:
+            raise SolveError(Status.BAD_CLOUD, "a node belongs to no triangle of the cloud: it coincides with another")
+        return triangles
+
+    def moved_to(self, cloud: Cloud) -> Triangles:
+        """The same triangles, edges and patches with the nodes at other places."""
+        return Triangles(cloud, self.corners, self.found or self)
+
+    @property
+    def upright(self) -> bool:
+        """No triangle has been turned inside out by the motion of its nodes."""
+        return bool((self.areas > 0.0).all())
+
+    @cached_property
+    def areas(self) -> np.ndarray:
+        """Area of each triangle [mm²]."""
+        a, b, c = (self.cloud.nodes[self.corners[:, i]] for i in range(3))
+        return 0.5 * ((b[:, 0] - a[:, 0]) * (c[:, 1] - a[:, 1]) - (b[:, 1] - a[:, 1]) * (c[:, 0] - a[:, 0]))
+
+    @cached_property
+    def edges(self) -> tuple[np.ndarray, np.ndarray]:
+        """Edges (E, 2), each once, smaller node first, and for each the triangles beside it (E, 2), −1 for none."""
+        if self.found is not None:
+            return self.found.edges
+        sides = np.sort(self.corners[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
+        owner = np.repeat(np.arange(len(self.corners)), 3)
+        key = sides[:, 0] * len(self.cloud.nodes) + sides[:, 1]
+        order = np.argsort(key, kind="stable")
+        first = np.flatnonzero(np.diff(key[order], prepend=-1))
+        beside = np.full((len(first), 2), -1)
+        beside[:, 0] = owner[order[first]]
+        twice = np.diff(np.append(first, len(key))) == 2
+        beside[twice, 1] = owner[order[first[twice] + 1]]
+        return sides[order[first]], beside
+
+    def midpoints(self) -> np.ndarray:
+        """Midpoints of the edges that have an end inside, (M, 2): the stress points between neighbours."""
+        ends, _ = self.edges
+        inner = ~self.cloud.on_boundary[ends].all(axis=1)
+        return self.cloud.nodes[ends[inner]].mean(axis=1)
+
+    @cached_property
+    def patch(self) -> np.ndarray:
+        """Number of the patch of each triangle, (T,): its pair where the triangles were found."""
+        return self.pairs() if self.found is None else self.found.patch
+
+    def pairs(self) -> np.ndarray:
+        """Number of the patch of each triangle, (T,): neighbours merged across their relatively longest common edges.
+
+        Locally dominant matching (Preis 1999): rounds in which every edge that is the best one left for both its
+        triangles merges them. Edge lengths are compared to six digits and ties broken by number, so that rounding does
+        not change the patches.
+        """
+        ends, beside = self.edges
+        inner = np.flatnonzero(beside[:, 1] >= 0)
+        sides = beside[inner]
+        length = np.linalg.norm(self.cloud.nodes[ends[inner, 0]] - self.cloud.nodes[ends[inner, 1]], axis=1)
+        merit = np.round(length / np.sqrt(self.areas[sides].mean(axis=1)), 6)
+        rank = np.empty(len(inner), dtype=int)
+        rank[np.lexsort((-np.arange(len(inner)), merit))] = np.arange(len(inner))
+        patch = np.arange(len(self.corners))
+        free = np.ones(len(self.corners), dtype=bool)
+        while len(sides):
+            best = np.full(len(self.corners), -1)
+            np.maximum.at(best, sides.ravel(), np.repeat(rank, 2))
+            dominant = (best[sides] == rank[:, None]).all(axis=1)
+            merged = sides[dominant]
+            patch[merged[:, 1]] = patch[merged[:, 0]]
+            free[merged.ravel()] = False
+            left = free[sides].all(axis=1)
+            sides, rank = sides[left], rank[left]
+        return np.unique(self._without_held_patches(patch, beside[inner]), return_inverse=True)[1]
+
+    def _without_held_patches(self, patch: np.ndarray, sides: np.ndarray) -> np.ndarray:
+        """Patches whose nodes all lie on walls joined to a neighbour: no unknown could change their dilatation."""
+        moves = ~self.cloud.on_boundary[self.corners].all(axis=1)
+        while True:
+            held = np.bincount(patch, moves, len(patch))[patch] == 0.0
+            exits = sides[held[sides[:, 0]] != held[sides[:, 1]]]
+            if not len(exits):
+                return patch
+            inner = held[exits[:, 0]]
+            ours = patch[np.where(inner, exits[:, 0], exits[:, 1])]
+            theirs = patch[np.where(inner, exits[:, 1], exits[:, 0])]
+            joined = np.arange(len(patch))
+            joined[ours] = theirs
+            patch = joined[patch]
+
+    @cached_property
+    def hat_gradients(self) -> np.ndarray:
+        """∇ of the linear hat function of each corner times the triangle's area, (T, 3, 2) [mm]."""
+        ahead, behind = self.cloud.nodes[self.corners[:, [1, 2, 0]]], self.cloud.nodes[self.corners[:, [2, 0, 1]]]
+        return 0.5 * np.stack([ahead[..., 1] - behind[..., 1], behind[..., 0] - ahead[..., 0]], axis=-1)
+
+    @cached_property
+    def node_areas(self) -> np.ndarray:
+        """A third of the triangles around each node, (N,) [mm²]."""
+        return np.bincount(self.corners.ravel(), np.repeat(self.areas / 3.0, 3), len(self.cloud.nodes))
+
+    def centroids(self) -> np.ndarray:
+        """(T, 2) [mm]."""
+        return self.cloud.nodes[self.corners].mean(axis=1)
+
+    def diamonds(self) -> tuple[np.ndarray, np.ndarray]:
+        """Midpoints (E, 2) of all edges, and a third of the triangles beside each, (E,) [mm²]: they fill the cloud."""
+        ends, beside = self.edges
+        areas = np.where(beside >= 0, self.areas[beside], 0.0).sum(axis=1) / 3.0
+        return self.cloud.nodes[ends].mean(axis=1), areas
+
+    def patches(self) -> Patches:
+        """The mean of div v over each patch."""
+        corners, areas, patch = self.corners, self.areas, self.patch
+        count = int(patch.max()) + 1
+        columns = 2 * corners[:, :, None] + np.arange(2)
+        rows = np.broadcast_to(patch[:, None, None], columns.shape)
+        shape = (count, 2 * len(self.cloud.nodes))
+        # Patch area times mean divergence: the net flux out of each patch.
+        net_flux = sp.csr_array((self.hat_gradients.ravel(), (rows.ravel(), columns.ravel())), shape=shape)
+        patch_areas = np.bincount(patch, areas, count)
+        dilatation = (sp.diags_array(1.0 / patch_areas) @ net_flux).tocsr()
+        centres = np.stack([np.bincount(patch, areas * c, count) / patch_areas for c in self.centroids().T], axis=1)
+        return Patches(self, dilatation, net_flux, patch_areas, centres)
+
+
+@dataclass(frozen=True)
+class Patches:
+    """Volume points of a triangulation: B_θ (L, 2N), its rows times the areas (L,) [mm²], and centres (L, 2) [mm]."""
+
+    triangles: Triangles
+    dilatation: Any
+    net_flux: Any
+    areas: np.ndarray
+    centres: np.ndarray
+
+    def force_per_area(self) -> Any:
+        """S_θ = −W⁻¹ B_θᵀ A (2F, L) at the interior nodes, per area W of their material."""
+        inside = self.triangles.cloud.interior
+        free = np.stack([2 * inside, 2 * inside + 1], axis=1).ravel()
+        per_area = sp.diags_array(-1.0 / np.repeat(self.triangles.node_areas[inside], 2))
+        return (per_area @ self.net_flux[:, free].T).tocsr()

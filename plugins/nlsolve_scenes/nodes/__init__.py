@@ -1,0 +1,1 @@
+"""Where nodes are placed: rings, rectangles, scattered points, files."""

@@ -1,0 +1,91 @@
+"""Rectangles of material and the nodes in them: on grid lines or scattered, closer to each other near the walls."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from dataclasses import replace
+from typing import Literal, Self
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from nlsolve.plugin import Cloud, ConstitutiveLaw, Scene
+from nlsolve_scenes.nodes.grading import lines, relative_spacing
+from nlsolve_scenes.nodes.scatter import jittered, scatter
+
+FIRST_ON_DIAGONAL = 0.75  # place of the inner node next to a corner, in distances of the walls' nodes
+
+
+class Rectangle(Scene):
+    """A scene in x₀ ≤ x ≤ x₀ + width, y₀ ≤ y ≤ y₀ + height, whose nodes stay where they are."""
+
+    spacing: float = Field(0.05, gt=0, description="mean distance of nodes [mm]")
+    grading: float = Field(
+        1.0,
+        gt=0,
+        le=1,
+        description="distance of nodes at the walls over that in the middle; on a grid 0.6 or more",
+    )
+    nodes: Literal["grid", "scattered"] = Field("grid", description="on grid lines, or scattered by repulsion")
+    jitter: float = Field(0.0, ge=0, lt=0.5, description="random shift of interior nodes, part of the nearest distance")
+    seed: int = Field(0, ge=0, description="of scattered nodes and of the random shifts")
+
+    @model_validator(mode="after")
+    def _on_fixed_nodes(self) -> Self:
+        if self.motion_of_nodes == "lagrangian":
+            raise ValueError(
+                'motion_of_nodes = "lagrangian": boundary nodes would leave the rectangle, so its nodes stay "fixed"'
+            )
+        return self
+
+    @property
+    @abstractmethod
+    def corners(self) -> tuple[tuple[float, float], tuple[float, float]]:
+        """(x₀, y₀) and (x₀ + width, y₀ + height) [mm]."""
+
+    def cloud(self, law: ConstitutiveLaw) -> Cloud:
+        """Boundary groups "bottom" and "top" (with the corners), "left" and "right" (without)."""
+        filled = self._grid if self.nodes == "grid" else self._scattered
+        return jittered(filled(), self.jitter, self.seed)
+
+    def boundary_position(self, cloud: Cloud, time: float) -> np.ndarray:
+        """Where they were."""
+        return cloud.nodes[cloud.boundary]
+
+    def _grid(self) -> Cloud:
+        low, high = np.array(self.corners)
+        x, y = (
+            start + side * lines(max(2, round(side / self.spacing)), self.grading)
+            for start, side in zip(low, high - low, strict=True)
+        )
+        return grid(x, y)
+
+    def _scattered(self) -> Cloud:
+        low, high = np.array(self.corners)
+        at_wall = self.spacing * float(relative_spacing(np.zeros(1), self.grading)[0])
+        x, y = (
+            np.linspace(start, end, max(2, round((end - start) / at_wall)) + 1)
+            for start, end in zip(low, high, strict=True)
+        )
+        frame = grid(x, y)
+        walls = {name: frame.nodes[group] for name, group in frame.boundaries.items()}
+        # A triangle of three wall nodes in a corner would have a dilatation that no unknown can change.
+        first = FIRST_ON_DIAGONAL * np.array([[x[1] - x[0], y[1] - y[0]]])
+        held = np.concatenate([np.where(side, low + first, high - first) for side in np.ndindex(2, 2)])
+
+        def inside(points: np.ndarray) -> np.ndarray:
+            return ((points > low) & (points < high)).all(axis=1)
+
+        def spacing(points: np.ndarray) -> np.ndarray:
+            depth = np.minimum(points - low, high - points) / (high - low)
+            return self.spacing * relative_spacing(np.maximum(depth.min(axis=1), 0.0), self.grading)
+
+        cloud = scatter(walls | {"held": held}, inside, spacing, self.seed)
+        return replace(cloud, boundaries={name: cloud.boundaries[name] for name in walls})
+
+
+def grid(x: np.ndarray, y: np.ndarray) -> Cloud:
+    """Nodes at the crossings of the lines x (C,) and y (R,), row by row from the bottom."""
+    nodes = np.stack([coordinate.ravel() for coordinate in np.meshgrid(x, y)], axis=1)
+    number = np.arange(len(nodes)).reshape(len(y), len(x))
+    return Cloud(nodes, {"bottom": number[0], "top": number[-1], "left": number[1:-1, 0], "right": number[1:-1, -1]})

@@ -1,0 +1,49 @@
+"""u ← u − K*⁻¹ R(u), mixed with the iterates before : modified Newton under Anderson acceleration."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import ClassVar, Literal
+
+import numpy as np
+from pydantic import Field
+
+from nlsolve.plugin import Globalized, KeptTangent, Mixing, NonlinearProblem, NonlinearSolver, Step
+
+
+class Anderson(NonlinearSolver):
+    """f(u) = −K*⁻¹ R(u), and the next u from the last m + 1 pairs (u, f) (`mixing`). On a linear problem the iterates
+    are as good as GMRES with K* as preconditioner (Walker & Ni 2011), at one solve each. When a K* that was kept is
+    renewed f is another function, and the pairs before are forgotten; a K* renewed at each iteration is part of one f.
+    """
+
+    kind: Literal["anderson"] = "anderson"
+    depth: int = Field(5, ge=0, description="m, differences of past iterates that are mixed; 0: none")
+    damping: float = Field(1.0, gt=0, le=1, description="β, part of f that is added")
+    globalization: Globalized = Field(  # type: ignore[assignment]
+        {"kind": "none"}, description="how far along the mixed step, 1 being all of it"
+    )
+    default_refresh: ClassVar = {"kind": "poor-contraction"}
+
+    def linearized(self, problem: NonlinearProblem) -> NonlinearProblem:
+        """The problem whose Jacobian is factorised into K*."""
+        return problem
+
+    def steps(self, problem: NonlinearProblem, tangent: KeptTangent, start: np.ndarray) -> Iterator[Step]:
+        """The iterates u_0, u_1, …"""
+        state, kept, linearized = start, False, self.linearized(problem)
+        residual, search = problem.residual(state), self.globalization.search(problem)
+        mixing = Mixing(self.depth, self.damping)
+        yield Step(state)
+        while True:
+            size = float(np.linalg.norm(residual))
+            renewed = tangent.refresh_if_due(linearized, state)
+            if renewed and kept:
+                mixing.forget()
+            kept = not renewed
+            direction = mixing.next(state, -tangent.solve(residual)) - state
+            length, residual = search.length(problem, state, residual, direction)
+            state = state + length * direction
+            contraction = float(np.linalg.norm(residual)) / size if size else 0.0
+            tangent.observe(contraction=contraction)
+            yield Step(state, notes={"length": length, "contraction": contraction})

@@ -1,0 +1,103 @@
+"""F(y) = R(u + K*⁻¹ y) = 0 : `scipy.optimize.root` on the residual preconditioned on the right."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any, ClassVar, Literal
+
+import numpy as np
+import scipy.optimize
+from pydantic import Field
+
+from nlsolve.plugin import KeptTangent, NonlinearProblem, NonlinearSolver, SolveError, Status, Step
+
+LEAST_GAIN = 0.1  # each run goes on until this part of the residual it began with is left
+MATRIX_IS_ONE = -1.0  # `alpha`: SciPy's methods begin with the Jacobian −1/α, and that of F is near 1
+
+
+class ScipyRoot(NonlinearSolver):
+    """y begins at 0; the residual is the true one, and each value of F costs one solve and one residual. Without
+    `precondition` F = R, as a caller of SciPy would have it who has no matrix. hybr needs a dense Jacobian, which it
+    makes of U differences of F, or is given: U products with J, and as many solves.
+
+    `root` does not hand over its iterates as they come, so one run of it is one step: until ‖F‖₂ ≤ `tolerance` · scale
+    and a tenth of its first value (hybr: until y changes by less than `tolerance`), or until `iterations` are used up.
+    Then the refresh rule is asked, having been told the contraction per value of F, and the next run begins here.
+    """
+
+    kind: Literal["scipy-root"] = "scipy-root"
+    method: Literal["hybr", "krylov", "broyden1", "anderson", "df-sane"] = Field("krylov", description="as in SciPy")
+    tolerance: float = Field(1e-8, gt=0, description="relative residual at which one run ends")
+    iterations: int = Field(50, gt=0, description="of SciPy's method in one run, before K* may be renewed")
+    precondition: bool = Field(True, description="right preconditioning by K*")
+    jacobian: Literal["differences", "products"] = Field("differences", description="how hybr comes by its matrix")
+    default_refresh: ClassVar = {"kind": "poor-contraction"}
+
+    def steps(self, problem: NonlinearProblem, tangent: KeptTangent, start: np.ndarray) -> Iterator[Step]:
+        """The start, and the ends of the runs."""
+        state, known = start, [problem.residual(start)]
+        size = float(np.linalg.norm(known[0]))
+        goal = self.tolerance * problem.scale(start)
+        yield Step(state)
+        while True:
+            if self.precondition:
+                tangent.refresh_if_due(problem, state)
+            found, values = self._run(problem, tangent, state, known, min(goal, LEAST_GAIN * size))
+            state = state + (tangent.solve(found.x) if self.precondition else found.x)
+            to_the_end = self.method == "hybr" or goal <= LEAST_GAIN * size
+            before, size = size, float(np.linalg.norm(found.fun))
+            contraction = (size / before) ** (1.0 / values) if before else 0.0
+            tangent.observe(contraction=contraction)
+            claim = True if found.success and to_the_end else None
+            yield Step(state, claim, {"contraction": contraction, **reported(found)})
+
+    def _run(
+        self,
+        problem: NonlinearProblem,
+        tangent: KeptTangent,
+        state: np.ndarray,
+        known: list[np.ndarray],
+        goal: float,
+    ) -> tuple[Any, int]:
+        """What one run of SciPy's method from y = 0 found, and how many values of F it took. SciPy asks for F(0) first:
+        a value that is `known` is handed over and forgotten.
+        """
+        values = 0
+
+        def moved(y: np.ndarray) -> np.ndarray:
+            return state + (tangent.solve(y) if self.precondition and y.any() else y)
+
+        def shifted(y: np.ndarray) -> np.ndarray:
+            nonlocal values
+            values += 1
+            if known:
+                return known.pop()
+            return problem.residual(moved(y))
+
+        def columns(y: np.ndarray) -> np.ndarray:
+            jacobian = problem.jacobian(moved(y))
+            directions = (tangent.solve(e) if self.precondition else e for e in np.eye(len(y)))
+            return np.stack([jacobian @ direction for direction in directions], axis=1)
+
+        given = columns if self.method == "hybr" and self.jacobian == "products" else None
+        try:
+            found = scipy.optimize.root(
+                shifted, np.zeros_like(state), jac=given, method=self.method, options=self._options(goal)
+            )
+        except ValueError as error:  # how SciPy's Jacobians say that a step or a pivot vanished
+            raise SolveError(Status.STAGNATED, f"scipy.optimize.root, {self.method}: {error}") from error
+        return found, values
+
+    def _options(self, goal: float) -> dict[str, Any]:
+        if self.method == "hybr":
+            return {"xtol": self.tolerance, "maxfev": 0}
+        if self.method == "df-sane":
+            return {"fatol": goal, "ftol": 0.0, "fnorm": np.linalg.norm, "maxfev": self.iterations}
+        options = {"fatol": goal, "tol_norm": np.linalg.norm, "maxiter": self.iterations}
+        return options if self.method == "krylov" else options | {"jac_options": {"alpha": MATRIX_IS_ONE}}
+
+
+def reported(found: Any) -> dict[str, float]:
+    """What SciPy says it did; no method says all of it."""
+    counters = {"reported_iterations": "nit", "reported_residuals": "nfev", "reported_jacobians": "njev"}
+    return {name: found[counter] for name, counter in counters.items() if counter in found}

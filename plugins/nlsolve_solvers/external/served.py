@@ -1,0 +1,147 @@
+"""R(u), K*⁻¹ b and J(u) v, as the callbacks of a library ask for them in the course of one run."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from nlsolve.plugin import AssembledOnce, KeptTangent, NonlinearProblem, SolveError, Status, Step
+
+LEAST_GAIN = 0.1  # each run goes on until this part of the residual it began with is left
+
+
+class Served:
+    """What one run works with, and what was found on the way.
+
+    goal : ‖R‖₂ at which the run may end: the one given, and a tenth of the first ‖R‖₂.
+    direct : whether the library shall take K* for its Jacobian, as with a factorised one, or multiply with J(u).
+    contraction : what the refresh rule was last told.
+    error : what a callback raised. An exception does not find its way through a library, so it waits here.
+    """
+
+    def __init__(
+        self, problem: NonlinearProblem, tangent: KeptTangent, start: np.ndarray, goal: float, direct: bool
+    ) -> None:
+        self._problem, self._tangent, self._direct = AssembledOnce(problem), tangent, direct
+        self.goal = goal
+        self.error: BaseException | None = None
+        self._sizes: dict[bytes, float] = {}
+        self.contraction = float("nan")
+        self._at_tangent: np.ndarray | None = None  # where K* was last asked for
+        self._solves = 0  # since then
+        self._solved: tuple[np.ndarray, np.ndarray] | None = None
+        self._state = start
+
+    def guarded(self, callback: Callable[[], None]) -> int:
+        """Zero, or −1 with the exception kept: how C is told."""
+        try:
+            callback()
+        except BaseException as error:
+            self.error = error
+            return -1
+        return 0
+
+    def residual(self, u: np.ndarray) -> np.ndarray:
+        """R(u)."""
+        residual = self._problem.residual(u)
+        size = float(np.linalg.norm(residual))
+        if not self._sizes:
+            self.goal = min(self.goal, LEAST_GAIN * size)
+        self._sizes[u.tobytes()] = size
+        return residual
+
+    def correction(self, u: np.ndarray) -> np.ndarray:
+        """K*⁻¹ R(u), or 0 where ‖R(u)‖₂ ≤ goal and no solve is needed to stop."""
+        residual = self.residual(u)
+        return np.zeros_like(u) if self.solved(u) else self.solve(residual)
+
+    def size(self, u: np.ndarray) -> float:
+        """‖R(u)‖₂, evaluated only where the library has not asked for R."""
+        known = self._sizes.get(u.tobytes())
+        return float(np.linalg.norm(self.residual(u))) if known is None else known
+
+    def solved(self, u: np.ndarray) -> bool:
+        """‖R(u)‖₂ ≤ goal."""
+        return self.size(u) <= self.goal
+
+    def renew(self, u: np.ndarray) -> None:
+        """The library wants its matrix set up at u: the refresh rule decides, told of the contraction since then."""
+        self.observe(u)
+        self._state = self._at_tangent = u.copy()
+        self._solves = 0
+        self._tangent.refresh_if_due(self._problem, u)
+
+    def observe(self, u: np.ndarray) -> None:
+        """Tell the refresh rule what each solve with K* has left, at u, of the residual since K* was asked for."""
+        if self._at_tangent is not None and self._solves:
+            before = self.size(self._at_tangent)
+            self.contraction = (self.size(u) / before) ** (1.0 / self._solves) if before else 0.0
+            self._tangent.observe(contraction=self.contraction)
+
+    def linearize(self, u: np.ndarray) -> None:
+        """J is wanted at u from now on."""
+        self._state = u.copy()
+
+    def solve(self, b: np.ndarray) -> np.ndarray:
+        """K*⁻¹ b."""
+        x = self._tangent.solve(b)
+        self._solves += 1
+        self._solved = x.copy(), b.copy()
+        return x
+
+    def product(self, v: np.ndarray) -> Any:
+        """J(u) v; where K* stands for J and v is its last solution K*⁻¹ b, that is b."""
+        if self._direct and self._solved is not None and np.array_equal(v, self._solved[0]):
+            return self._solved[1]
+        return self._problem.jacobian(self._state) @ v
+
+    def transposed_product(self, v: np.ndarray) -> Any:
+        """J(u)ᵀ v."""
+        return self._problem.jacobian(self._state).transposed_product(v)
+
+
+@dataclass(frozen=True)
+class Ending:
+    """Where a run ended.
+
+    gave_up : why the library gave up, in its word; empty when it came to the goal or used up its iterations.
+    reported : what the library says it did, by the names of the columns.
+    """
+
+    state: np.ndarray
+    gave_up: str
+    reported: Mapping[str, float]
+
+
+def runs(
+    serve: Callable[[np.ndarray], Served],
+    run: Callable[[Served, np.ndarray], Ending],
+    start: np.ndarray,
+    set_up_first: bool,
+) -> Iterator[Step]:
+    """The start, and the ends of the runs, each from the end of the one before.
+
+    serve : what a run from this state works with.
+    set_up_first : whether K* is wanted before the library begins, which then does not ask for it.
+
+    A run that gives up where it began is followed by another one, before which the refresh rule may want another K*.
+    Raises SolveError (stagnated) when that one gives up there too.
+    """
+    state, stuck = start, False
+    yield Step(state)
+    while True:
+        served, before = serve(state), state
+        if set_up_first:
+            served.renew(state)
+        ending = run(served, before)
+        state = ending.state
+        served.observe(state)
+        again = bool(ending.gave_up) and not served.size(state) < served.size(before)
+        if stuck and again:
+            raise SolveError(Status.STAGNATED, ending.gave_up)
+        stuck = again
+        claim = False if ending.gave_up else None
+        yield Step(state, claim, {"contraction": served.contraction, **ending.reported})

@@ -1,0 +1,5 @@
+"""The asymptotic numerical method: a homotopy, a series with one kept K*, and a range. One choice a file."""
+
+from nlsolve_solvers.homotopy.method import AsymptoticNumericalMethod
+
+__all__ = ["AsymptoticNumericalMethod"]

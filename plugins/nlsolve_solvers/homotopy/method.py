@@ -1,0 +1,152 @@
+"""W(a) = a W_1 + … + a^p W_p along a homotopy from a solved problem to G(W) = 0 : the asymptotic numerical method.
+
+Timesli, Braikat, Lahmam, Zahrouni (2015), after Jamal, Braikat, Boutmir, Damil, Potier-Ferry (2002).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import ClassVar, Literal
+
+import numpy as np
+from pydantic import Field
+
+from nlsolve.plugin import KeptTangent, NonlinearProblem, NonlinearSolver, SolveError, Status, Step
+from nlsolve_solvers.homotopy.branch import Branch
+from nlsolve_solvers.homotopy.ranges import RULES
+
+ROUNDING = 1e-10  # W_2 below this part of W_1 is rounding: K* is the tangent
+SHORTEST_RANGE = 1e-6  # a series that advances less than this part of its path is exhausted
+LOOSEST = 0.1  # η where little residual is left: a series must still gain a digit
+END = "end of path"
+FIRST_CHECK = 3  # terms before an adaptive series asks for its range: W_2 may vanish
+
+
+class AsymptoticNumericalMethod(NonlinearSolver):
+    """K* W_j = r_j for j = 1 … p, one kept K* for all orders; then a state W(a), a ≤ min(1, a_max).
+
+    Choices, each alone: the form of the homotopy (and so of r_j), how W(a) is made of the W_j, the rule for its range
+    a_max, whether p is a number or found as the series goes, whether η is a number or what a wanted residual asks for,
+    and Newton corrections at the end of the path.
+    a_max ≥ 1: W(1) is the solution and K* is kept. a_max < 1: the refresh rule may renew K* here and the series is
+    computed again; with a K* that is already new, the state advances to W(a_max) and a branch begins there. Each branch
+    that is used says what limited its range (`limited_by` in `steps`).
+    The defaults are the method of the 2015 paper, its range guarded.
+
+    An adaptive series stops at the first order with a_max ≥ 1, or where one more order costs more, by the range it
+    adds, than a new branch does: in units of one order a branch of p orders costs c + p and advances a_max, so where
+
+        a_max(p)/a_max(p − 1) < 1 + 1/(c + p)          (the mean growth over the last two orders)
+
+    the least cost of a unit of path, (c + p)/a_max(p), has been passed.
+    """
+
+    kind: Literal["anm"] = "anm"
+    order: int = Field(20, ge=2, description="p, order of the series; the highest one where it is adaptive")
+    tolerance: float = Field(
+        1e-6,
+        gt=0,
+        description="η: largest last term over the first (ratio), residual left over the first (residual rules), "
+        "difference over the value (pade-pair), (1/ρ)^p with ρ the nearest pole",
+    )
+    form: Literal["fixed-point", "newton"] = Field(
+        "fixed-point", description="(1 − a) K* W + a G(W) = 0, or G(W) = (1 − a) (G(0) + (J − K*) W)"
+    )
+    extrapolation: Literal["series", "pade", "gram-schmidt-pade"] = Field(
+        "series", description="how W(a) is made of its Taylor coefficients"
+    )
+    range: Literal["ratio", "residual-coefficient", "true-residual", "pade-pair", "nearest-pole"] = Field(
+        "ratio", description="what limits a_max"
+    )
+    adaptive: bool = Field(
+        False, description="stop adding orders, from the third on, as soon as a_max ≥ 1 or a new branch is cheaper"
+    )
+    branch_cost: float = Field(
+        40.0, ge=0, description="c, cost of a new K* over that of an order of an adaptive series: factor_solve_ratio"
+    )
+    residual: float | None = Field(
+        None, gt=0, description="relative residual wanted at the end of a path; it sets η in the place of `tolerance`"
+    )
+    corrections: int = Field(0, ge=0, description="Newton corrections with K* at the end of a path")
+    default_refresh: ClassVar = {"kind": "range-under-one"}
+    claims: ClassVar[bool] = True
+
+    def steps(self, problem: NonlinearProblem, tangent: KeptTangent, start: np.ndarray) -> Iterator[Step]:
+        """The ends of the branches, and of their corrections."""
+        state = start
+        goal = None if self.residual is None else self.residual * problem.scale(start)
+        yield Step(state)
+        while True:
+            fresh = tangent.refresh_if_due(problem, state)
+            branch, reach, limit = self._branch(problem, tangent, state, goal)
+            if reach < 1.0 and not fresh and tangent.refresh_if_due(problem, state):
+                branch, reach, limit = self._branch(problem, tangent, state, goal)
+            length = min(1.0, reach)
+            if not length > SHORTEST_RANGE:
+                nearest = f"its nearest singularity is about {branch.singularity:.1e} of the path away"
+                raise SolveError(
+                    Status.RANGE_EXHAUSTED, f"a_max = {reach:.1e} for a series of order {branch.order}; {nearest}"
+                )
+            notes: dict[str, float | str] = {
+                "range": reach,
+                "length": length,
+                "limited_by": limit,
+                "singularity": branch.singularity,
+                "contraction": branch.contraction,
+            }
+            state = state + branch.increment(length)
+            yield Step(state, claim=length == 1.0, notes=notes)
+            for _ in range(self.corrections if length == 1.0 else 0):
+                state = state - tangent.solve(problem.residual(state))
+                yield Step(state, claim=True)
+
+    def _branch(
+        self, problem: NonlinearProblem, tangent: KeptTangent, state: np.ndarray, goal: float | None
+    ) -> tuple[Branch, float, str]:
+        """W_1 … W_p around `state`, a_max, and what limited it. The refresh rule is told a_max, and the contraction by
+        order, which is what K* can be held responsible for.
+        """
+        branch, rule = Branch(problem, state, self.form, self.extrapolation), RULES[self.range]
+        reaches: list[float] = []
+        limit: str = self.range
+        for j in range(1, self.order + 1):
+            rhs = branch.recurrence.right_hand_side()
+            branch.append(rhs, tangent.solve(rhs))
+            if branch.sizes[0] == 0.0:
+                reaches.append(np.inf)
+                break
+            if self.adaptive and FIRST_CHECK <= j < self.order:
+                reaches.append(rule(branch, self._tolerance(branch, goal), False))
+                if reaches[-1] >= 1.0:
+                    break
+                if self._is_dear(reaches, j):
+                    limit = "cost"
+                    break
+        if not (reaches and reaches[-1] >= 1.0):
+            if self.order == 2 and branch.sizes[1] <= ROUNDING * branch.sizes[0]:
+                raise SolveError(
+                    Status.RANGE_EXHAUSTED,
+                    "W_2 vanishes because K* is the tangent here, so a series of order 2 has no range: "
+                    "use order 3 or more",
+                )
+            reaches.append(rule(branch, self._tolerance(branch, goal), True))
+        reach = 0.0 if np.isnan(reaches[-1]) else reaches[-1]
+        tangent.observe(range=reach, contraction=branch.contraction)
+        if reach >= 1.0:
+            return branch, reach, END
+        if self.adaptive and branch.order == self.order:
+            limit = "order"
+        return branch, reach, "pole" if branch.has_pole() else limit
+
+    def _tolerance(self, branch: Branch, goal: float | None) -> float:
+        """η: as given, or the part of ‖G(0)‖ that a wanted residual leaves."""
+        if goal is None:
+            return self.tolerance
+        return goal / branch.residual if goal < LOOSEST * branch.residual else LOOSEST
+
+    def _is_dear(self, reaches: list[float], p: int) -> bool:
+        """Whether the order p added less range than a new branch of p orders would, at the price of an order."""
+        if len(reaches) < 3:
+            return False
+        growth = np.sqrt(reaches[-1] / reaches[-3])
+        return bool(growth < 1.0 + 1.0 / (self.branch_cost + p))

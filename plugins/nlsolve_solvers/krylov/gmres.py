@@ -1,0 +1,76 @@
+"""min ‖b − A x‖₂ over x = M⁻¹ v, v in span{b, A M⁻¹ b, …} : GMRES, preconditioned on the right.
+
+Saad & Schultz (1986).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from nlsolve.plugin import SolveError, Status
+
+Map = Callable[[np.ndarray], np.ndarray]
+
+
+@dataclass(frozen=True)
+class Krylov:
+    """What GMRES found.
+
+    solution : x, shape (U,).
+    left : ‖b − A x‖₂.
+    count : dimension of the space, which is the number of products, and of solves with M.
+    """
+
+    solution: np.ndarray
+    left: float
+    count: int
+
+
+def gmres(product: Map, precondition: Map, b: np.ndarray, tolerance: float, most: int) -> Krylov:
+    """x with ‖b − A x‖ ≤ tolerance, or the best of `most` dimensions; b ≠ 0.
+
+    Preconditioned on the right, the residual that is minimised is the true one, and x = Z y needs no further solve.
+    """
+    size = left = float(np.linalg.norm(b))
+    basis, directions = np.empty((most + 1, len(b))), np.empty((most, len(b)))
+    basis[0] = b / size
+    triangle, rotated = np.zeros((most, most)), [size]  # R of the Hessenberg matrix, and Qᵀ e_1 ‖b‖
+    rotations: list[tuple[float, float]] = []
+    for k in range(most):
+        directions[k] = precondition(basis[k])
+        w: np.ndarray = product(directions[k])
+        length = float(np.linalg.norm(w))
+        if not np.isfinite(length):
+            raise SolveError(Status.NON_FINITE, "a product with the Jacobian was not finite")
+        column = np.zeros(k + 1)
+        for _ in range(2):  # Gram and Schmidt twice are enough (Kahan)
+            projections = basis[: k + 1] @ w
+            w = w - projections @ basis[: k + 1]
+            column += projections
+        beyond = float(np.linalg.norm(w))
+        triangle[: k + 1, k], rotation = rotated_column([*column.tolist(), beyond], rotations)
+        rotations.append(rotation)
+        cosine, sine = rotation
+        rotated[k:] = [cosine * rotated[k], -sine * rotated[k]]
+        left = abs(rotated[k + 1])
+        if left <= tolerance or beyond <= np.finfo(float).eps * length:
+            break
+        basis[k + 1] = w / beyond
+    count = len(rotations)
+    y = np.linalg.lstsq(triangle[:count, :count], np.array(rotated[:count]), rcond=None)[0]
+    return Krylov(y @ directions[:count], left, count)
+
+
+def rotated_column(
+    column: list[float], rotations: list[tuple[float, float]]
+) -> tuple[list[float], tuple[float, float]]:
+    """A new column of the Hessenberg matrix after the rotations before it (Givens), and the one that clears its end."""
+    for i, (cosine, sine) in enumerate(rotations):
+        upper, lower = column[i], column[i + 1]
+        column[i], column[i + 1] = cosine * upper + sine * lower, cosine * lower - sine * upper
+    norm = float(np.hypot(column[-2], column[-1]))
+    rotation = (column[-2] / norm, column[-1] / norm) if norm else (1.0, 0.0)
+    return [*column[:-2], norm], rotation

@@ -1,0 +1,71 @@
+"""‖R(u) + J(u) w‖ ≤ η ‖R(u)‖,  u ← u + t w : inexact Newton by GMRES, with the kept K* as preconditioner."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from typing import ClassVar, Literal
+
+import numpy as np
+from pydantic import Field
+
+from nlsolve.plugin import AssembledOnce, Globalized, KeptTangent, NonlinearProblem, NonlinearSolver, Step
+from nlsolve_solvers.krylov.forcing import next_forcing
+from nlsolve_solvers.krylov.gmres import gmres
+
+SMALLEST_FORCING = 1e-6  # below it lies what the next residual will correct anyway
+
+
+class NewtonKrylov(NonlinearSolver):
+    """Dembo, Eisenstat & Steihaug (1982); forcing terms η of Eisenstat & Walker (1996), and t from a globalisation,
+    which is told that w promises 1 − ‖R + J w‖/‖R‖ only.
+
+    J w comes from the assembled Jacobian, or without one from the residual's own series: [R(u + a w)]_1. The refresh
+    rule is told the contraction per inner iteration: that is what K* can be held responsible for.
+    """
+
+    kind: Literal["newton-krylov"] = "newton-krylov"
+    forcing: Literal["linear-model", "ratio", "constant"] = Field(
+        "ratio", description="η: choice 1 or choice 2 of Eisenstat and Walker, or the first η throughout"
+    )
+    first_forcing: float = Field(0.1, gt=0, lt=1, description="η of the first iteration")
+    products: Literal["jacobian", "series"] = Field(
+        "series", description="J w by a Jacobian assembled once an iteration, or each by a series of order 1"
+    )
+    dimension: int = Field(40, gt=0, description="largest dimension of the Krylov space")
+    globalization: Globalized = Field(  # type: ignore[assignment]
+        {"kind": "backtracking"}, description="how the step length t is found"
+    )
+    default_refresh: ClassVar = {"kind": "poor-contraction"}
+
+    def steps(self, problem: NonlinearProblem, tangent: KeptTangent, start: np.ndarray) -> Iterator[Step]:
+        """The iterates u_0, u_1, …"""
+        problem, search = AssembledOnce(problem), self.globalization.search(problem)
+        state, eta = start, self.first_forcing
+        residual = problem.residual(state)
+        yield Step(state)
+        while True:
+            size = float(np.linalg.norm(residual))
+            tangent.refresh_if_due(problem, state)
+            if size == 0.0:
+                yield Step(state)
+                continue
+            found = gmres(self._product(problem, state), tangent.solve, -residual, eta * size, self.dimension)
+            length, residual = search.length(problem, state, residual, found.solution, 1.0 - found.left / size)
+            state = state + length * found.solution
+            contraction = (found.left / size) ** (1.0 / found.count)
+            tangent.observe(contraction=contraction)
+            yield Step(state, notes={"length": length, "contraction": contraction})
+            size_now = float(np.linalg.norm(residual))
+            eta = max(next_forcing(self.forcing, eta, size_now, size, found.left), SMALLEST_FORCING)
+
+    def _product(self, problem: NonlinearProblem, state: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:
+        """w ↦ J w at the state."""
+        if self.products == "jacobian":
+            return problem.jacobian(state).__matmul__
+
+        def along(w: np.ndarray) -> np.ndarray:
+            expansion = problem.expand(state)
+            expansion.append(w)
+            return expansion.coefficient(1)
+
+        return along

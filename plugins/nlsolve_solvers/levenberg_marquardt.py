@@ -1,0 +1,72 @@
+"""(JᵀJ + μ D) w = −Jᵀ R(u),  u ← u + w where ‖R‖ falls : Levenberg and Marquardt's method, in the end Newton's."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any, Literal
+
+import numpy as np
+from pydantic import Field
+
+from nlsolve.plugin import Expansion, KeptTangent, NonlinearProblem, NonlinearSolver, SolveError, Status, Step
+
+ACCEPTED = 1e-4  # gain over the one predicted from which a step is taken
+LARGEST_SHIFT = 1e12  # μ: shorter steps are lost in the rounding of u
+
+
+class LevenbergMarquardt(NonlinearSolver):
+    """Levenberg (1944), Marquardt (1963), with D = diag(JᵀJ) (Moré 1978) and the damping μ of Nielsen (1999):
+
+        ρ = (‖R(u)‖² − ‖R(u + w)‖²)/(‖R(u)‖² − ‖R(u) + J w‖²)
+        ρ > 0 : the step is taken,  μ ← μ max(1/3, 1 − (2 ρ − 1)³),  ν ← 2;      else  μ ← μ ν,  ν ← 2 ν.
+
+    What is factorised, and kept as long as the refresh rule says, is (I, J; Jᵀ, −μ D), with the J and the μ of that
+    moment; J of a kept one is the model that ρ is measured against. A step that is refused is told to the rule as a
+    contraction above 1, and needs a new matrix: where the rule would rather keep the old one, the method has stagnated.
+    """
+
+    kind: Literal["levenberg-marquardt"] = "levenberg-marquardt"
+    shift: float = Field(1e-3, gt=0, description="μ of the first step")
+
+    def steps(self, problem: NonlinearProblem, tangent: KeptTangent, start: np.ndarray) -> Iterator[Step]:
+        """The iterates u_0, u_1, …"""
+        state, shift, growth, refused = start, self.shift, 2.0, False
+        residual = problem.residual(state)
+        yield Step(state)
+        while True:
+            size = float(np.linalg.norm(residual))
+            renewed = tangent.refresh_if_due(Augmented(problem, shift), state)
+            if refused and (shift > LARGEST_SHIFT or not renewed):
+                why = f"with a damping of {shift:.1e}" if renewed else "and the refresh rule keeps its matrix"
+                raise SolveError(Status.STAGNATED, f"a step was refused because ‖R‖ does not fall, {why}")
+            both = tangent.solve(np.concatenate([-residual, np.zeros_like(state)]))
+            left, step = np.split(both, 2)
+            trial = problem.residual(state + step)
+            trial_size, predicted = float(np.linalg.norm(trial)), size**2 - float(left @ left)
+            gain = (size**2 - trial_size**2) / predicted if predicted > 0.0 else float(size == 0.0)
+            refused = not gain > ACCEPTED
+            contraction = trial_size / size if size else 0.0
+            tangent.observe(contraction=max(contraction, 1.0) if refused else contraction)
+            if refused:
+                if renewed:  # else its model may be at fault, which is an older J's
+                    shift, growth = shift * growth, 2.0 * growth
+                continue
+            shift, growth = shift * max(1.0 / 3.0, 1.0 - (2.0 * gain - 1.0) ** 3), 2.0
+            state, residual = state + step, trial
+            yield Step(state, notes={"contraction": contraction})
+
+
+class Augmented(NonlinearProblem):
+    """R(u) = 0 as the kept tangent shall see it: (I, J; Jᵀ, −μ D)."""
+
+    def __init__(self, problem: NonlinearProblem, shift: float) -> None:
+        self._problem, self._shift = problem, shift
+
+    def residual(self, u: np.ndarray) -> np.ndarray:
+        return self._problem.residual(u)
+
+    def jacobian(self, u: np.ndarray) -> Any:
+        return self._problem.jacobian(u).augmented(self._shift)
+
+    def expand(self, u: np.ndarray) -> Expansion:
+        return self._problem.expand(u)

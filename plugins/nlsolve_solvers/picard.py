@@ -1,0 +1,43 @@
+"""u ← u − β A(u)⁻¹ R(u),  R(u) = A(u) u + c(u) : Picard's iteration, whose matrix holds the coefficients fixed."""
+
+from __future__ import annotations
+
+from typing import Any, ClassVar, Literal
+
+import numpy as np
+from pydantic import Field
+
+from nlsolve.plugin import Expansion, NonlinearProblem
+from nlsolve_solvers.anderson import Anderson
+
+
+class Picard(Anderson):
+    """A(u_k) u_{k+1} = −c(u_k), written as a correction u_{k+1} = u_k − A(u_k)⁻¹ R(u_k): the same iterates, and the one
+    form of the two that still ends at R = 0 when the refresh rule keeps A of an earlier state. β < 1 relaxes, β > 1
+    goes further; `depth` mixes as in `anderson`. For a power law of index n the error contracts by 1 − n per iteration.
+    """
+
+    kind: Literal["picard"] = "picard"  # type: ignore[assignment]
+    depth: int = Field(0, ge=0, description="m, differences of past iterates that are mixed; 0: none")
+    damping: float = Field(1.0, gt=0, lt=2, description="β, relaxation of the correction")
+    default_refresh: ClassVar = {"kind": "every-iteration"}
+
+    def linearized(self, problem: NonlinearProblem) -> NonlinearProblem:
+        """The problem with A in the place of its Jacobian."""
+        return Secant(problem)
+
+
+class Secant(NonlinearProblem):
+    """R(u) = 0 as a kept tangent shall see it for Picard: J is A."""
+
+    def __init__(self, problem: NonlinearProblem) -> None:
+        self._problem = problem
+
+    def residual(self, u: np.ndarray) -> np.ndarray:
+        return self._problem.residual(u)
+
+    def jacobian(self, u: np.ndarray) -> Any:
+        return self._problem.secant(u)
+
+    def expand(self, u: np.ndarray) -> Expansion:
+        return self._problem.expand(u)

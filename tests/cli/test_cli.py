@@ -1,0 +1,198 @@
+"""The command line: what is printed where, and the exit codes."""
+
+from __future__ import annotations
+
+import json
+from importlib.metadata import version
+
+import pytest
+from fakes import Newton, Plugin, fake_march, registry_of, write_study
+from typer.testing import CliRunner
+
+from nlsolve.cli.app import app
+
+BARS = {"FORCE_COLOR": "1", "TERM": "xterm", "COLUMNS": "200"}
+
+
+@pytest.fixture(autouse=True)
+def fake(monkeypatch, tmp_path):
+    monkeypatch.setattr("nlsolve.study.study.load_registry", registry_of)
+    monkeypatch.setattr("nlsolve.cli.app.load_registry", registry_of)
+    monkeypatch.setattr("nlsolve.running.runner.march", fake_march)
+    monkeypatch.chdir(tmp_path)
+
+
+def nlsolve(*arguments: object, env: dict[str, str] | None = None):
+    result = CliRunner().invoke(app, [str(argument) for argument in arguments], env=env)
+    assert "Traceback" not in result.output
+    return result
+
+
+def test_run_prints_tables_on_stdout_and_progress_on_stderr(tmp_path):
+    result = nlsolve("run", write_study(tmp_path))
+    assert result.exit_code == 0
+    assert "solver.tolerance = 1e-06" in result.stdout
+    told = result.stderr.splitlines()
+    second = next(line for line in told if line.startswith("case 2/4"))
+    assert second.startswith("case 2/4, converged, 4 factorisations")
+    assert second.endswith("(solver.order = 10, solver.tolerance = 1e-08)")
+    assert "s left" in result.stderr
+    assert "4 cases: 4 converged; results in results/study" in result.stderr
+    assert "cases:" not in result.stdout
+    assert (tmp_path / "results" / "study" / "runs.csv").exists()
+    again = nlsolve("run", write_study(tmp_path))
+    assert "converged before" in again.stderr
+
+
+def test_run_shows_a_bar_on_a_terminal(tmp_path):
+    result = nlsolve("run", write_study(tmp_path), env=BARS)
+    assert result.exit_code == 0
+    assert "case 4/4" in result.stderr
+    assert "━" in result.stderr
+
+
+def test_run_json_quick_set_and_out(tmp_path):
+    path = write_study(tmp_path)
+    result = nlsolve(
+        "run", path, "--quick", "--set", "solver.order=5", "--set", "law.index=0.25", "--json", "--out", "o"
+    )
+    document = json.loads(result.stdout)
+    assert (document["study"], document["folder"], len(document["runs"])) == ("study", "o", 1)
+    (row,) = document["runs"]
+    assert (row["solver.order"], row["law.index"], row["scene.side"], row["velocity_error"]) == (5, 0.25, "right", None)
+    assert document["tables"]["branches"] == [{"solver.order": "5", "solver.tolerance = 1e-06": 120}]
+    assert nlsolve("run", path, "--quick").exit_code == 0
+    assert (tmp_path / "results" / "study-quick").is_dir()
+
+
+def test_run_without_tables_lists_endings(tmp_path):
+    result = nlsolve("run", write_study(tmp_path), "--set", "table=[]")
+    assert "the stopping test was met" in result.stdout
+
+
+def test_divergence_is_a_result(tmp_path, monkeypatch):
+    def march(setup, listen, clock):
+        record = fake_march(setup, listen)
+        record.summary["status"] = "diverged"
+        return record
+
+    monkeypatch.setattr("nlsolve.running.runner.march", march)
+    result = nlsolve("run", write_study(tmp_path))
+    assert result.exit_code == 0
+    assert "4 cases: 4 diverged" in result.stderr
+    assert "ended as diverged: " in result.stderr
+
+
+def test_a_crash_is_1(tmp_path, monkeypatch):
+    def march(setup, listen, clock):
+        raise RuntimeError("[oops]")
+
+    monkeypatch.setattr("nlsolve.running.runner.march", march)
+    result = nlsolve("run", write_study(tmp_path))
+    assert result.exit_code == 1
+    assert "crashed: RuntimeError: [oops] (" in result.stderr
+
+
+def test_an_interruption_is_130_and_keeps_what_is_finished(tmp_path, monkeypatch):
+    count = 0
+
+    def march(setup, listen, clock):
+        nonlocal count
+        count += 1
+        if count == 2:
+            raise KeyboardInterrupt
+        return fake_march(setup, listen)
+
+    monkeypatch.setattr("nlsolve.running.runner.march", march)
+    result = nlsolve("run", write_study(tmp_path), "--out", "o")
+    assert result.exit_code == 130
+    assert "interrupted; the finished cases are in o and the same command does the rest" in result.stderr
+    table = nlsolve("table", "o", "--json")
+    assert json.loads(table.stdout)["branches"] == [{"solver.order": "10", "solver.tolerance = 1e-06": 60}]
+    monkeypatch.setattr("nlsolve.running.runner.march", fake_march)
+    assert nlsolve("run", write_study(tmp_path), "--out", "o").exit_code == 0
+
+
+@pytest.mark.parametrize(
+    ("arguments", "sentence"),
+    [
+        (["run", "nowhere.toml"], "nowhere.toml: the study cannot be read: No such file or directory"),
+        (["run", "study.toml", "--set", "solver.ordr=3"], "no such field; did you mean 'order'?"),
+        (["validate", "study.toml", "--set", "solver.kind=amn"], "no such solver; did you mean 'anm'?"),
+        (["plan", "study.toml", "--set", "nonsense"], "--set nonsense: expected key=value"),
+        (["run", "study.toml", "--out", "study.toml/o"], "cannot be written there (Not a directory)"),
+        (["table", "nowhere"], "not a results folder"),
+    ],
+)
+def test_invalid_input_is_2_in_one_sentence(tmp_path, arguments, sentence):
+    write_study(tmp_path)
+    result = nlsolve(*arguments)
+    assert result.exit_code == 2
+    assert sentence in result.stderr
+    assert len(result.stderr.strip().splitlines()) == 1
+    assert result.stdout == ""
+
+
+def test_results_of_another_study_are_2(tmp_path):
+    path = write_study(tmp_path)
+    assert nlsolve("run", path).exit_code == 0
+    result = nlsolve("run", path, "--set", "law.index=0.3")
+    assert result.exit_code == 2
+    assert "holds results of another study" in result.stderr
+
+
+def test_table(tmp_path):
+    nlsolve("run", write_study(tmp_path), "--out", "o")
+    assert "solver.tolerance = 1e-06" in nlsolve("table", "o").stdout
+    assert "60" in nlsolve("table", "o", "branches").stdout
+    wrong = nlsolve("table", "o", "brances")
+    assert (wrong.exit_code, wrong.stderr.strip()) == (2, "o: there is no table 'brances'; did you mean 'branches'?")
+
+
+def test_validate(tmp_path):
+    path = write_study(tmp_path)
+    assert nlsolve("validate", path).stdout == f"{path} is valid: 4 cases (1 with --quick). How many branches?\n"
+    document = json.loads(nlsolve("validate", path, "--json").stdout)
+    assert document == {"study": "study", "question": "How many branches?", "cases": 4, "quick_cases": 1}
+    bad = write_study(tmp_path, ('"scene.side" = "right"', '"scene.sid" = "right"'))
+    result = nlsolve("validate", bad)
+    assert result.exit_code == 2
+    assert "line 25: scene.sid = 'right': no such field; did you mean 'side'?" in result.stderr
+
+
+def test_plan(tmp_path):
+    path = write_study(tmp_path)
+    result = nlsolve("plan", path)
+    assert result.exit_code == 0
+    assert "4 cases" in result.stdout
+    assert "then one factorisation and 20 pairs of triangular solves an increment" in result.stdout
+    cases = json.loads(nlsolve("plan", path, "--set", "scene.horizon=1e-3", "--json").stdout)["cases"]
+    assert [(row["increments"], row["nodes"], row["unknowns"]) for row in cases] == [(10, 4, 2)] * 4
+    first = cases[0]
+    assert first["seconds_increment"] > first["seconds_factorization"] + 20 * first["seconds_triangular_solve"]
+    assert first["seconds_iteration"] > first["seconds_factorization"] + first["seconds_triangular_solve"]
+    assert first["seconds"] == pytest.approx(10 * first["seconds_increment"])
+    assert first["seconds_start"] == pytest.approx(2 * 5 * first["seconds_iteration"])  # n = 1 and the target
+    assert first["seconds_all"] == pytest.approx(
+        first["seconds_start"] + first["seconds"] + first["seconds_operators"]  # fixed nodes have one cloud
+    )
+
+
+def test_plugins_and_why_one_failed(monkeypatch):
+    registry = registry_of()
+    registry.add(Plugin(Newton), "another 2.0")
+    registry.add(object(), "broken 0.1")
+    monkeypatch.setattr("nlsolve.cli.app.load_registry", lambda: registry)
+    result = nlsolve("plugins")
+    assert result.exit_code == 0
+    assert "order: int = 20  p" in result.stdout
+    assert "offered by fakes 1.0 and another 2.0: uninstall all but one" in result.stdout
+    assert "it has no function nlsolve_components" in result.stdout
+    rows = json.loads(nlsolve("plugins", "--json").stdout)
+    anm = next(row for row in rows if row["kind"] == "anm")
+    assert anm["parameters"][0] == {"name": "order", "type": "int", "default": 20, "description": "p"}
+    assert rows[-1]["source"] == "broken 0.1"
+
+
+def test_version():
+    assert nlsolve("--version").stdout == f"nlsolve {version('nlsolve')}\n"

@@ -1,0 +1,214 @@
+"""Force and torque of the moving wall: by virtual power in conservative forms, through a contour in strong ones."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any, Literal
+
+import numpy as np
+import pytest
+from cases import near, run, setup
+from nlsolve_discretizers import LinearTriangles, MovingLeastSquares
+from nlsolve_laws import PowerLaw
+from nlsolve_scenes import Channel, EccentricCylinders, StirringTool
+from nlsolve_scenes.nodes.rings import GradedRings, Rings
+from nlsolve_solvers import Newton
+
+from nlsolve.contracts.continuum.law import CONTRACTION
+from nlsolve.flow.march import march
+from nlsolve.flow.momentum import Flow
+from nlsolve.flow.observables import wall_reaction
+from nlsolve.plugin import Discretizer, Scene
+from nlsolve.series import Array
+from nlsolve.solving.stopping import StoppingTest
+
+CONSERVATIVE = {
+    "delaunay": LinearTriangles(),
+    "mls": MovingLeastSquares(form="conservative"),
+    "mls nodes": MovingLeastSquares(form="conservative", points="nodes"),
+}
+OMEGA = 100.0
+
+
+class Encircled(StirringTool):
+    """The tool with a contour of any radius."""
+
+    kind: Literal["encircled"] = "encircled"  # type: ignore[assignment]
+    contour_radius: float = 3.0
+
+    def contour(self) -> Array:
+        angle = 2.0 * np.pi * np.arange(720) / 720
+        return self.contour_radius * np.stack([np.cos(angle), np.sin(angle)], axis=1)
+
+
+def spin(discretizer: Discretizer, index: float, penalty: float = 0.0, nodes: Any = None) -> tuple[Flow, Array]:
+    """The steady spin solved to rounding on coarse rings, and its unknowns."""
+    scene, law = StirringTool(nodes=nodes or Rings(spacing=0.5)), PowerLaw(index=index, regularization=1e-2)
+    cloud = scene.cloud(law)
+    walls = scene.boundary_velocity(cloud, law, 0.0)
+    flow = Flow(cloud, discretizer.operators(cloud, penalty > 0.0), law, walls, penalty)
+    outcome, _ = run(flow, Newton(), None, near(flow, min(1.0, 1.5 * index)), stop=StoppingTest(tolerance=1e-13))
+    assert outcome.residual_norm <= 1e-13
+    return flow, outcome.state
+
+
+def reaction(flow: Flow, u: Array, discretizer: Discretizer, scene: Scene | None = None) -> dict[str, float]:
+    return wall_reaction(scene or StirringTool(), discretizer, flow, flow.velocity(u), 0.0)
+
+
+def dissipation(flow: Flow, u: Array) -> float:
+    """Σ A s : ε̇ + Σ A_θ λ (tr ε̇)² [N/s], the power that the flow turns into heat."""
+    operators = flow.operators
+    assert operators.strain_areas is not None
+    strain_rate = (operators.strain @ flow.velocity(u).ravel()).reshape(3, -1)
+    power = np.sum(CONTRACTION[:, None] * operators.strain_areas * flow.stress_at_points(u) * strain_rate)
+    dilatation, pressure = flow.dilatation_rate(u), flow.pressure(u)
+    if dilatation is not None:
+        assert operators.volume_areas is not None
+        power -= np.sum(operators.volume_areas * pressure * dilatation)
+    return float(power)
+
+
+# Conservative forms: virtual power.
+
+
+@pytest.mark.parametrize("penalty", [0.0, 1e4])
+@pytest.mark.parametrize("index", [1.0, 0.5])
+@pytest.mark.parametrize("discretizer", CONSERVATIVE.values(), ids=CONSERVATIVE)
+def test_torque_times_speed_is_the_dissipation(discretizer: Discretizer, index: float, penalty: float) -> None:
+    """R(u) = 0 against the flow itself: what the tool puts in is what the material takes, to the last digits."""
+    flow, u = spin(discretizer, index, penalty)
+    assert reaction(flow, u, discretizer)["torque"] * OMEGA == pytest.approx(dissipation(flow, u), rel=1e-10)
+
+
+@pytest.mark.parametrize("discretizer", CONSERVATIVE.values(), ids=CONSERVATIVE)
+def test_the_contour_only_says_which_wall(discretizer: Discretizer) -> None:
+    flow, u = spin(discretizer, 0.5, 1e3)
+    found = [
+        reaction(flow, u, discretizer, Encircled(contour_radius=radius)) for radius in (1.5001, 1.7, 3.0, 5.0, 5.9999)
+    ]
+    assert all(other == found[0] for other in found)
+
+
+@pytest.mark.parametrize("discretizer", CONSERVATIVE.values(), ids=CONSERVATIVE)
+def test_the_plate_holds_what_the_tool_puts_in(discretizer: Discretizer) -> None:
+    """A contour around all nodes adds both walls up: no force is left, and no torque."""
+    flow, u = spin(discretizer, 0.5, 1e3)
+    both, tool = (reaction(flow, u, discretizer, Encircled(contour_radius=radius)) for radius in (7.0, 3.0))
+    for name in ("force_x", "force_y", "torque"):
+        assert abs(both[name]) < 1e-9 * tool["torque"]
+
+
+class TestTorqueOfTheSpin:
+    """Conservative forms err by O(h²): halving the spacing takes about a quarter of the error."""
+
+    @staticmethod
+    def error(discretizer: Discretizer, index: float, spacing: float) -> float:
+        flow, u = spin(discretizer, index, nodes=Rings(spacing=spacing))
+        return reaction(flow, u, discretizer)["torque_error"]
+
+    @pytest.mark.parametrize("index", [1.0, 0.5])
+    def test_second_order_on_triangles(self, index: float) -> None:
+        coarse, fine = (self.error(CONSERVATIVE["delaunay"], index, spacing) for spacing in (0.375, 0.1875))
+        assert fine < 0.01
+        assert 1.7 <= np.log2(coarse / fine) <= 2.3
+
+    @pytest.mark.parametrize("name", CONSERVATIVE)
+    def test_on_the_papers_nodes(self, name: str) -> None:
+        assert self.error(CONSERVATIVE[name], 1.0, 0.25) < 0.021
+
+
+def solved(scene: Scene, discretizer: Discretizer, index: float = 1.0, tolerance: float = 1e-10) -> dict[str, Any]:
+    row = march(setup(scene, index, discretizer=discretizer, stop=StoppingTest(tolerance=tolerance))).summary
+    assert row["status"] == "converged", row["message"]
+    return row
+
+
+# Strong forms: σ n through the contour.
+
+
+def test_the_exact_field_of_the_spin_gives_the_exact_torque_through_any_contour() -> None:
+    discretizer, law = MovingLeastSquares(), PowerLaw(index=0.5, regularization=1e-6)
+    scene = StirringTool(nodes=GradedRings(first=0.05, growth=0.05))
+    cloud = scene.cloud(law)
+    exact = scene.exact(law, cloud.nodes, 0.0)
+    assert exact is not None
+    operators = discretizer.operators(cloud, True)
+    plain = Flow(cloud, operators, law, exact.velocity[cloud.boundary])
+    assert operators.volume_points is not None
+    constant = np.full(len(operators.volume_points), 9.0)
+    pressed = Flow(cloud, operators, law, exact.velocity[cloud.boundary], 1e-12, constant)
+    for radius in (1.8, 3.0, 5.0):
+        found = [
+            wall_reaction(Encircled(contour_radius=radius), discretizer, flow, exact.velocity, 0.0)
+            for flow in (plain, pressed)
+        ]
+        assert found[0]["torque"] == pytest.approx(exact.quantities["torque"], rel=2e-3)
+        for name in ("force_x", "force_y", "torque"):  # a constant pressure pushes a closed contour nowhere
+            assert abs(found[1][name] - found[0][name]) < 1e-8 * 9.0 * radius
+
+
+def test_a_strong_form_does_not_use_virtual_power() -> None:
+    """Its torque is that of the same stresses through the contour, which depends (little) on the contour."""
+    discretizer = MovingLeastSquares()
+    flow, u = spin(discretizer, 0.5, nodes=Rings())
+    torques = [
+        reaction(flow, u, discretizer, Encircled(contour_radius=radius))["torque"] for radius in (2.5, 3.0, 4.0, 5.0)
+    ]
+    assert len(set(torques)) == len(torques)
+    np.testing.assert_allclose(torques, torques[0], rtol=0.02)
+
+
+# Where there is a pressure.
+
+
+PENALTY, ITERATED = {"penalty": 1e4}, {"penalty": 1e3, "divergence": 1e-7}
+
+
+@pytest.mark.parametrize(("name", "volume"), [("delaunay", PENALTY), ("delaunay", ITERATED), ("mls", PENALTY)])
+def test_the_force_of_the_orbit_by_virtual_power_is_that_through_the_contour(name: str, volume: dict[str, Any]) -> None:
+    """The same scene by a conservative form and by a strong one."""
+    scene = StirringTool.model_validate({"motion": "orbit", "nodes": Rings(spacing=0.25), **volume})
+    by_power, through = (
+        np.array([row["force_x"], row["force_y"]])
+        for row in (solved(scene, form) for form in (CONSERVATIVE[name], MovingLeastSquares()))
+    )
+    assert np.linalg.norm(by_power - through) < 0.02 * np.linalg.norm(through)
+
+
+def test_both_ways_on_one_and_the_same_flow() -> None:
+    """Operators that keep their areas to themselves are measured through the contour."""
+    discretizer, law = LinearTriangles(), PowerLaw(index=1.0)
+    scene = StirringTool(motion="orbit", nodes=Rings(spacing=0.25))
+    cloud = scene.cloud(law)
+    operators = discretizer.operators(cloud, True)
+    modulus = scene.with_(penalty=1e4).penalty_modulus(law, np.ones(1))
+    flow = Flow(cloud, operators, law, scene.boundary_velocity(cloud, law, 0.0), modulus)
+    u = run(flow, Newton(), None, np.zeros(2 * len(cloud.interior)))[0].state
+    secret = Flow(cloud, replace(operators, strain_areas=None), law, scene.boundary_velocity(cloud, law, 0.0), modulus)
+    power, contour = reaction(flow, u, discretizer, scene), reaction(secret, u, discretizer, scene)
+    assert power["force_x"] == pytest.approx(contour["force_x"], rel=0.02)
+    assert abs(power["force_y"] - contour["force_y"]) < 0.02 * abs(power["force_x"])
+
+
+@pytest.mark.parametrize(
+    ("discretizer", "volume"),
+    [
+        (LinearTriangles(), PENALTY),
+        (LinearTriangles(), ITERATED),
+        (MovingLeastSquares(), PENALTY),
+        (MovingLeastSquares(), ITERATED),
+        (CONSERVATIVE["mls"], PENALTY),
+    ],
+)
+def test_torque_and_force_of_the_bearing(discretizer: Discretizer, volume: dict[str, Any]) -> None:
+    """2560 nodes, Jeffery's closed form: within one percent."""
+    row = solved(EccentricCylinders.model_validate({"spacing": 0.1, **volume}), discretizer)
+    assert row["nodes"] == 2560
+    assert row["torque_error"] <= 0.01
+    assert row["force_error"] <= 0.01
+
+
+def test_no_contour_no_reaction() -> None:
+    flow, u = spin(LinearTriangles(), 1.0)
+    assert reaction(flow, u, LinearTriangles(), Channel()) == {}

@@ -1,0 +1,184 @@
+"""The plugins' door: what is found, what fails alone, and what is said about it."""
+
+from __future__ import annotations
+
+import importlib.metadata
+import sys
+from typing import Any, ClassVar, Literal
+
+import pytest
+from fakes import COMPONENTS, Homotopy, Honey, Newton, Plugin, registry_of
+from pydantic import TypeAdapter, ValidationError
+
+from nlsolve.plugin import NonlinearSolver, hookimpl
+from nlsolve.registry.registry import CONTRACTS, Registry, load_registry
+
+
+class OtherNewton(Newton):
+    """The same kind from somebody else."""
+
+
+class NoKind(NonlinearSolver):
+    """A solver that forgot its name."""
+
+    def steps(self, problem: Any, tangent: Any, start: Any) -> Any:
+        return iter(())
+
+
+class LooseKind(NoKind):
+    """A name that is no literal."""
+
+    kind: str = "loose"
+
+
+class Unfinished(NonlinearSolver):
+    """No steps."""
+
+    kind: Literal["unfinished"] = "unfinished"
+
+
+class Absent(Newton):
+    """A solver whose library is not installed."""
+
+    kind: Literal["absent"] = "absent"
+    absent: ClassVar[str | None] = "needs the library absent: pip install absent"
+
+
+class WithoutHook:
+    """Nothing to register."""
+
+
+class Raising:
+    """A hook that fails."""
+
+    @hookimpl
+    def nlsolve_components(self) -> Any:
+        raise RuntimeError("no licence found\nsecond line")
+
+
+def failures(registry: Registry) -> list[str]:
+    return [row.failure for row in registry.plugins() if row.failure]
+
+
+def test_classes_by_noun_and_kind():
+    registry = registry_of()
+    assert registry.classes("solver") == {"anm": Homotopy, "newton": Newton}
+    assert registry.classes("law") == {"honey": Honey}
+    assert registry.classes("nothing") == {}
+    assert set(CONTRACTS) == {
+        "scene",
+        "law",
+        "discretizer",
+        "linear",
+        "solver",
+        "refresh",
+        "predictor",
+        "globalization",
+    }
+
+
+def test_rows_tell_source_and_parameters():
+    rows = {(row.noun, row.kind): row for row in registry_of().plugins()}
+    assert len(rows) == len(COMPONENTS)
+    row = rows["solver", "anm"]
+    order = row.parameters[0]
+    assert (row.source, order.name, order.type, order.default, order.description) == (
+        "fakes 1.0",
+        "order",
+        "int",
+        20,
+        "p",
+    )
+
+
+@pytest.mark.parametrize("classes", [(Newton, Homotopy), (Newton,)])
+def test_union_of_many_or_one_asks_for_a_kind(classes):
+    section = TypeAdapter(registry_of(*classes).union("solver"))
+    assert section.validate_python({"kind": "newton"}) == Newton()
+    assert section.validate_python(Newton()) == Newton()
+    with pytest.raises(ValidationError, match="required, and missing; installed: "):
+        section.validate_python({})
+    with pytest.raises(ValidationError, match="no such solver; did you mean 'newton'"):
+        section.validate_python({"kind": "newtn"})
+    with pytest.raises(ValidationError, match="should be a table with a kind"):
+        section.validate_python(3)
+    with pytest.raises(ValidationError, match="no such solver"):
+        section.validate_python({"kind": ["newton"]})
+
+
+def test_a_kind_without_its_library_is_refused_in_its_own_words():
+    registry = registry_of(Newton, Absent)
+    sentence = "solver 'absent' needs the library absent: pip install absent"
+    assert registry.classes("solver") == {"newton": Newton}
+    assert failures(registry) == [sentence]
+    with pytest.raises(ValidationError, match=sentence):
+        TypeAdapter(registry.union("solver")).validate_python({"kind": "absent"})
+    with pytest.raises(ValidationError, match=r"no such solver; did you mean 'newton'\? installed: newton \["):
+        TypeAdapter(registry.union("solver")).validate_python({"kind": "newtn"})
+
+
+def test_union_of_nothing():
+    section = TypeAdapter(registry_of(Honey).union("solver"))
+    with pytest.raises(ValidationError, match="no such solver; installed: none"):
+        section.validate_python({"kind": "newton"})
+
+
+def test_two_plugins_with_one_name():
+    registry = registry_of(Newton, Homotopy)
+    registry.add(Plugin(OtherNewton), "other 2.0")
+    assert registry.classes("solver") == {"anm": Homotopy}
+    sentence = "solver 'newton' is offered by fakes 1.0 and other 2.0: uninstall all but one"
+    assert registry.complaint("solver", "newton") == sentence
+    assert failures(registry) == [sentence, sentence]
+    with pytest.raises(ValidationError, match=sentence):
+        TypeAdapter(registry.union("solver")).validate_python({"kind": "newton"})
+
+
+@pytest.mark.parametrize(
+    ("plugin", "reason"),
+    [
+        (WithoutHook(), "TypeError: it has no function nlsolve_components marked with @hookimpl"),
+        (Raising(), "RuntimeError: no licence found"),
+        (Plugin(int), "TypeError: <class 'int'> is not a subclass of one of Scene, System"),
+        (Plugin(NoKind), 'NoKind must declare its name: kind: Literal["name"] = "name"'),
+        (Plugin(LooseKind), 'LooseKind must declare its name: kind: Literal["name"] = "name"'),
+        (Plugin(Unfinished), "Unfinished leaves methods of its contract out: steps"),
+    ],
+)
+def test_a_plugin_that_cannot_be_registered_fails_alone(plugin, reason):
+    registry = registry_of(Newton)
+    registry.add(plugin, "broken 0.1")
+    assert registry.classes("solver") == {"newton": Newton}
+    (failure,) = failures(registry)
+    assert reason in failure
+    assert "\n" not in failure
+    assert registry.plugins()[-1].source == "broken 0.1"
+    assert "1 plugin(s) failed, see `nlsolve plugins`" in str(registry.complaint("solver", "nwton"))
+
+
+def test_entry_points_are_loaded_one_at_a_time(tmp_path, monkeypatch):
+    (tmp_path / "good_plugin.py").write_text(
+        "import fakes\nfrom nlsolve.plugin import hookimpl\n\n\n"
+        "@hookimpl\ndef nlsolve_components():\n    return [fakes.Newton]\n"
+    )
+    (tmp_path / "bad_plugin.py").write_text("import a_module_nobody_has\n")
+    info = tmp_path / "strangers-3.1.dist-info"
+    info.mkdir()
+    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: strangers\nVersion: 3.1\n")
+    (info / "entry_points.txt").write_text("[nlsolve]\na-bad-one = bad_plugin\nb-good-one = good_plugin\n")
+    monkeypatch.setattr(sys, "path", [str(tmp_path), *sys.path])
+    ours = [e for e in importlib.metadata.entry_points(group="nlsolve") if e.dist and e.dist.name == "strangers"]
+    assert len(ours) == 2
+    monkeypatch.setattr("nlsolve.registry.registry.entry_points", lambda group: ours)
+    registry = Registry.installed()
+    assert list(registry.classes("solver")) == ["newton"]
+    good, bad = registry.plugins()
+    assert good.source == "strangers 3.1 (good_plugin)"
+    assert bad.source == "strangers 3.1 (bad_plugin)"
+    assert bad.failure == (
+        "the plugin 'a-bad-one' cannot be imported: ModuleNotFoundError: No module named 'a_module_nobody_has'"
+    )
+
+
+def test_the_installed_registry_is_loaded_once():
+    assert load_registry() is load_registry()
