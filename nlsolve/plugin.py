@@ -7,12 +7,12 @@ from nlsolve.contracts.continuum.cloud import Cloud, Exact
 from nlsolve.contracts.continuum.discretizer import Discretizer, Operators
 from nlsolve.contracts.continuum.law import ConstitutiveLaw, PowerForm, local_index, stress
 from nlsolve.contracts.continuum.scene import Scene
-from nlsolve.contracts.globalization import Globalization, Search
 from nlsolve.contracts.linear_solver import Factors, LinearSolver
 from nlsolve.contracts.nonlinear_solver import KeptTangent, NonlinearSolver, Step
-from nlsolve.contracts.predictor import Predictor
 from nlsolve.contracts.problem import Expansion, NonlinearProblem
-from nlsolve.contracts.refresh import Evidence, RefreshRule
+from nlsolve.contracts.rules.globalization import Globalization, Search
+from nlsolve.contracts.rules.predictor import Predictor
+from nlsolve.contracts.rules.refresh import Evidence, RefreshRule
 from nlsolve.contracts.status import SolveError, Status
 from nlsolve.contracts.system import System
 from nlsolve.registry.hookspecs import hookimpl

@@ -13,13 +13,13 @@ from nlsolve_scenes import StirringTool
 from nlsolve_scenes.nodes.rings import Rings
 from nlsolve_solvers import Newton
 
+from nlsolve.contracts.outcome import Outcome
 from nlsolve.flow.momentum import Flow
 from nlsolve.flow.setup import Setup
 from nlsolve.plugin import NonlinearProblem, NonlinearSolver, RefreshRule, Scene
 from nlsolve.series import Array
 from nlsolve.solving.driver import solve
 from nlsolve.solving.ledger import Ledger
-from nlsolve.solving.outcome import Outcome
 from nlsolve.solving.stopping import Budget, StoppingTest
 from nlsolve.solving.tangent import Tangent
 

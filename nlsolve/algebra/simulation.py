@@ -13,8 +13,9 @@ import pandas as pd
 from nlsolve.algebra.colouring import Compression
 from nlsolve.contracts.linear_solver import LinearSolver
 from nlsolve.contracts.nonlinear_solver import NonlinearSolver
+from nlsolve.contracts.outcome import Outcome
 from nlsolve.contracts.problem import Expansion, NonlinearProblem
-from nlsolve.contracts.refresh import RefreshRule
+from nlsolve.contracts.rules.refresh import RefreshRule
 from nlsolve.contracts.status import SolveError, Status
 from nlsolve.contracts.system import System
 from nlsolve.flow.setup import Progress, Record, reported
@@ -22,7 +23,6 @@ from nlsolve.results.columns import STEPS
 from nlsolve.series import Array, Series
 from nlsolve.solving.driver import solve
 from nlsolve.solving.ledger import Ledger
-from nlsolve.solving.outcome import Outcome
 from nlsolve.solving.stopping import Budget, StoppingTest
 from nlsolve.solving.tangent import Tangent
 

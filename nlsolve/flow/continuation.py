@@ -11,10 +11,10 @@ from pydantic import Field, ValidationInfo, field_validator
 
 from nlsolve.contracts.component import Component
 from nlsolve.contracts.continuum.law import ConstitutiveLaw
+from nlsolve.contracts.outcome import Outcome
 from nlsolve.contracts.status import Status
 from nlsolve.flow.momentum import Flow
 from nlsolve.series import Array
-from nlsolve.solving.outcome import Outcome
 from nlsolve.solving.stopping import Budget
 
 LOAD = "load"

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from nlsolve.contracts.outcome import Outcome
 from nlsolve.contracts.status import SolveError, Status
 from nlsolve.flow.continuation import Stage, walk
 from nlsolve.flow.momentum import Flow
@@ -21,7 +22,6 @@ from nlsolve.results.columns import STEPS
 from nlsolve.series import Array
 from nlsolve.solving.driver import solve
 from nlsolve.solving.ledger import Ledger
-from nlsolve.solving.outcome import Outcome
 from nlsolve.solving.stopping import StoppingTest
 from nlsolve.solving.tangent import Tangent
 

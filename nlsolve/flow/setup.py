@@ -13,9 +13,9 @@ from nlsolve.contracts.continuum.law import ConstitutiveLaw
 from nlsolve.contracts.continuum.scene import Scene
 from nlsolve.contracts.linear_solver import LinearSolver
 from nlsolve.contracts.nonlinear_solver import NonlinearSolver
-from nlsolve.contracts.predictor import Predictor
 from nlsolve.contracts.problem import NonlinearProblem
-from nlsolve.contracts.refresh import RefreshRule
+from nlsolve.contracts.rules.predictor import Predictor
+from nlsolve.contracts.rules.refresh import RefreshRule
 from nlsolve.flow.continuation import Start
 from nlsolve.results.columns import REPORTED
 from nlsolve.series import Array

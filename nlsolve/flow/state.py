@@ -13,6 +13,7 @@ from scipy.spatial import cKDTree
 from nlsolve.contracts.continuum.cloud import Cloud
 from nlsolve.contracts.continuum.discretizer import Operators
 from nlsolve.contracts.continuum.law import ConstitutiveLaw, rate_squared
+from nlsolve.contracts.outcome import Outcome
 from nlsolve.contracts.status import Status
 from nlsolve.flow.incompressibility import pressure_mixing
 from nlsolve.flow.momentum import Convection, Flow, Inertia
@@ -21,7 +22,6 @@ from nlsolve.flow.observables import discretization_error, divergence
 from nlsolve.flow.setup import Setup
 from nlsolve.series import Array
 from nlsolve.solving.ledger import Ledger
-from nlsolve.solving.outcome import Outcome
 
 
 class Balance:

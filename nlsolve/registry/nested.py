@@ -11,7 +11,7 @@ from typing import Annotated, Any
 from pydantic import BeforeValidator, SerializeAsAny
 
 from nlsolve.contracts.component import Component
-from nlsolve.contracts.globalization import Globalization
+from nlsolve.contracts.rules.globalization import Globalization
 from nlsolve.registry.registry import load_registry
 
 

@@ -24,11 +24,11 @@ from nlsolve.contracts.component import Component
 from nlsolve.contracts.continuum.discretizer import Discretizer
 from nlsolve.contracts.continuum.law import ConstitutiveLaw
 from nlsolve.contracts.continuum.scene import Scene
-from nlsolve.contracts.globalization import Globalization
 from nlsolve.contracts.linear_solver import LinearSolver
 from nlsolve.contracts.nonlinear_solver import NonlinearSolver
-from nlsolve.contracts.predictor import Predictor
-from nlsolve.contracts.refresh import RefreshRule
+from nlsolve.contracts.rules.globalization import Globalization
+from nlsolve.contracts.rules.predictor import Predictor
+from nlsolve.contracts.rules.refresh import RefreshRule
 from nlsolve.contracts.system import System
 from nlsolve.registry import hookspecs
 

@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 
 from nlsolve.contracts.nonlinear_solver import NonlinearSolver
+from nlsolve.contracts.outcome import Outcome
 from nlsolve.contracts.problem import NonlinearProblem
 from nlsolve.contracts.status import SolveError, Status
 from nlsolve.series import Array
 from nlsolve.solving.ledger import Audited, Ledger
-from nlsolve.solving.outcome import Outcome
 from nlsolve.solving.stopping import Budget, StoppingTest
 from nlsolve.solving.tangent import Tangent
 

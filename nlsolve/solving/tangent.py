@@ -10,7 +10,7 @@ import numpy as np
 from nlsolve.contracts.linear_solver import Factors, LinearSolver
 from nlsolve.contracts.nonlinear_solver import KeptTangent
 from nlsolve.contracts.problem import NonlinearProblem
-from nlsolve.contracts.refresh import Evidence, RefreshRule
+from nlsolve.contracts.rules.refresh import Evidence, RefreshRule
 from nlsolve.contracts.status import SolveError, Status
 from nlsolve.series import Array
 from nlsolve.solving.ledger import Ledger, SealedMatrix, factorize_counted, solve_counted

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from nlsolve.contracts.globalization import Globalization
-from nlsolve.contracts.predictor import Predictor
-from nlsolve.contracts.refresh import Evidence, RefreshRule
+from nlsolve.contracts.rules.globalization import Globalization
+from nlsolve.contracts.rules.predictor import Predictor
+from nlsolve.contracts.rules.refresh import Evidence, RefreshRule
 from nlsolve.testing.promises import norm, require, same
 from nlsolve.testing.toy_problem import SmallProblem
 

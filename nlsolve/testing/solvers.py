@@ -8,7 +8,7 @@ import numpy as np
 
 from nlsolve.contracts.nonlinear_solver import KeptTangent, NonlinearSolver, Step
 from nlsolve.contracts.problem import NonlinearProblem
-from nlsolve.contracts.refresh import RefreshRule
+from nlsolve.contracts.rules.refresh import RefreshRule
 from nlsolve.contracts.status import Status
 from nlsolve.series import Array
 from nlsolve.solving.driver import solve

@@ -15,10 +15,10 @@ from nlsolve_solvers import Newton
 from pydantic import ValidationError
 
 from nlsolve import Status, Study
+from nlsolve.contracts.outcome import Outcome
 from nlsolve.flow.continuation import Stage, Start, walk
 from nlsolve.flow.march import march
 from nlsolve.registry.problems import StudyError
-from nlsolve.solving.outcome import Outcome
 from nlsolve.solving.stopping import Budget
 
 COARSE = Rings(spacing=0.5)

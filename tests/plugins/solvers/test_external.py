@@ -18,11 +18,11 @@ from pydantic import ValidationError
 
 import nlsolve
 from nlsolve import SolveError, Status
+from nlsolve.contracts.outcome import Outcome
 from nlsolve.plugin import NonlinearSolver, RefreshRule
 from nlsolve.results.columns import REPORTED
 from nlsolve.solving.driver import solve
 from nlsolve.solving.ledger import Audited, Ledger
-from nlsolve.solving.outcome import Outcome
 from nlsolve.solving.stopping import Budget, StoppingTest
 from nlsolve.solving.tangent import Tangent
 from nlsolve.testing import check_solver

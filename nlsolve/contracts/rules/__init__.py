@@ -1,0 +1,1 @@
+"""The contracts of rules that methods share: when K* is renewed, where an increment begins, how long a step may be."""
