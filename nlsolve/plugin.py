@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
+from nlsolve.algebra.system import System
 from nlsolve.contracts.component import Component
 from nlsolve.contracts.continuum.cloud import Cloud, Exact
 from nlsolve.contracts.continuum.discretizer import Discretizer, Operators
 from nlsolve.contracts.continuum.law import ConstitutiveLaw, PowerForm, local_index, stress
-from nlsolve.contracts.continuum.scene import Scene
+from nlsolve.contracts.continuum.terms import NodeMotion, Physics, Recording, TimeSteps
 from nlsolve.contracts.linear_solver import Factors, LinearSolver
 from nlsolve.contracts.nonlinear_solver import KeptTangent, NonlinearSolver, Step
 from nlsolve.contracts.problem import Expansion, NonlinearProblem
 from nlsolve.contracts.rules.globalization import Globalization, Search
 from nlsolve.contracts.rules.predictor import Predictor
 from nlsolve.contracts.rules.refresh import Evidence, RefreshRule
+from nlsolve.contracts.scene import Entry, Misfit, Preparation, Scene, Section, Simulation, SingleSolve, Solve, Workload
 from nlsolve.contracts.status import SolveError, Status
-from nlsolve.contracts.system import System
+from nlsolve.flow.scene import FlowScene
 from nlsolve.registry.hookspecs import hookimpl
 from nlsolve.registry.nested import Globalized
 from nlsolve.series import Series, upright
@@ -27,28 +29,41 @@ __all__ = [
     "Component",
     "ConstitutiveLaw",
     "Discretizer",
+    "Entry",
     "Evidence",
     "Exact",
     "Expansion",
     "Factors",
+    "FlowScene",
     "Globalization",
     "Globalized",
     "KeptTangent",
     "LinearSolver",
+    "Misfit",
     "Mixing",
+    "NodeMotion",
     "NonlinearProblem",
     "NonlinearSolver",
     "Operators",
+    "Physics",
     "PowerForm",
     "Predictor",
+    "Preparation",
+    "Recording",
     "RefreshRule",
     "Scene",
     "Search",
+    "Section",
     "Series",
+    "Simulation",
+    "SingleSolve",
+    "Solve",
     "SolveError",
     "Status",
     "Step",
     "System",
+    "TimeSteps",
+    "Workload",
     "hookimpl",
     "local_index",
     "stress",

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from nlsolve.flow.setup import Setup
 from nlsolve_discretizers import MovingLeastSquares
 from nlsolve_laws import PowerLaw
 from nlsolve_linear.superlu import SuperLU
@@ -15,7 +16,6 @@ from nlsolve_solvers import Newton
 
 from nlsolve.contracts.outcome import Outcome
 from nlsolve.flow.momentum import Flow
-from nlsolve.flow.setup import Setup
 from nlsolve.plugin import NonlinearProblem, NonlinearSolver, RefreshRule, Scene
 from nlsolve.series import Array
 from nlsolve.solving.driver import solve

@@ -8,10 +8,10 @@ from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
 import pandas as pd
+from nlsolve.flow.setup import Progress, Record, Setup
 from pydantic import Field
 from scipy.sparse import csc_array
 
-from nlsolve.flow.setup import Progress, Record, Setup
 from nlsolve.plugin import (
     Cloud,
     Component,

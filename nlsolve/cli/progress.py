@@ -51,7 +51,7 @@ class Watch:
             self.console.print(words, markup=False, highlight=False, soft_wrap=True)
 
     def words(self, event: Event, done: float) -> str:
-        """case 3/16, increment 12/1250, branch 3, 17 factorisations, 140 s left (solver.order = 20)
+        """case 3/16, increment 12/1250, tangent 3, 17 factorisations, 140 s left (solver.order = 20)
 
         The label comes last: a narrow terminal cuts it off, not the numbers.
         """
@@ -60,7 +60,7 @@ class Watch:
             words.append(f"{event.run['status']}{' before' if event.resumed else ''}")
         now = event.progress
         if now is not None:
-            words.append(f"increment {now.increment}/{now.increments}, branch {now.branches}")
+            words.append(f"increment {now.increment}/{now.increments}, tangent {now.tangents}")
         words.append(f"{self.factorizations + (now.factorizations if now else 0)} factorisations")
         computed = done - self.read_back
         if computed > 0 and done < event.cases:

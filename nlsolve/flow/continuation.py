@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Generator
 from dataclasses import dataclass, replace
 from typing import ClassVar
 
@@ -11,11 +11,12 @@ from pydantic import Field, ValidationInfo, field_validator
 
 from nlsolve.contracts.component import Component
 from nlsolve.contracts.continuum.law import ConstitutiveLaw
+from nlsolve.contracts.nonlinear_solver import NonlinearSolver
 from nlsolve.contracts.outcome import Outcome
+from nlsolve.contracts.scene import Preparation, Solve
 from nlsolve.contracts.status import Status
 from nlsolve.flow.momentum import Flow
 from nlsolve.series import Array
-from nlsolve.solving.stopping import Budget
 
 LOAD = "load"
 """What is varied when it is no field of the law: the part of boundary velocities and body forces that acts."""
@@ -91,9 +92,10 @@ class Start(Component):
             )
         return stages
 
-    def budget(self, budget: Budget) -> Budget:
-        """What one stage may cost."""
-        return budget.with_(iterations=min(self.iterations, budget.iterations)) if self.adaptive else budget
+    def preparation(self, starter: NonlinearSolver, iterations: int) -> Preparation:
+        """How one stage is solved, by the starting method within its budget of iterations."""
+        most = min(self.iterations, iterations) if self.adaptive else iterations
+        return Preparation(starter, self.tolerance, most)
 
     def between(self, first: Stage, target: Stage, part: float) -> Stage:
         """The stage at log-interpolated `by`; part = 0: first, part = 1: target."""
@@ -107,31 +109,39 @@ class Start(Component):
         )
 
 
-def walk(start: Start, law: ConstitutiveLaw, solve: Callable[[Stage, bool], Outcome]) -> tuple[Outcome, Stage]:
+Solves = Generator[Solve, Outcome, Outcome]
+"""Problems yielded to the driver, the outcome of each sent back, and the outcome of the last returned."""
+
+
+def walk(
+    start: Start, law: ConstitutiveLaw, solve: Callable[[Stage, bool], Solves]
+) -> Generator[Solve, Outcome, tuple[Outcome, Stage]]:
     """Solve stage after stage, each from the state the last one left; the outcome of the last, and which that was.
 
-    solve(stage, last) keeps the state of a stage that converges, and forgets what became of one that does not.
+    solve(stage, last) yields the problems of a stage; the state of one that converges is where the next begins.
     """
     stages = start.stages(law)
     if start.adaptive and len(stages) > 1:
-        return _adaptive(start, stages, solve)
+        return (yield from _adaptive(start, stages, solve))
     for stage in stages:
-        outcome = solve(stage, stage is stages[-1])
+        outcome = yield from solve(stage, stage is stages[-1])
         if outcome.status is not Status.CONVERGED:
             break
     return outcome, stage
 
 
-def _adaptive(start: Start, stages: list[Stage], solve: Callable[[Stage, bool], Outcome]) -> tuple[Outcome, Stage]:
+def _adaptive(
+    start: Start, stages: list[Stage], solve: Callable[[Stage, bool], Solves]
+) -> Generator[Solve, Outcome, tuple[Outcome, Stage]]:
     """Along log(by), `step` being a part of the whole way."""
     first, second, target = stages[0], stages[1], stages[-1]
     step = float(np.log(second.value / first.value) / np.log(target.value / first.value))
     reached, here = 0.0, first
-    outcome = solve(first, False)
+    outcome = yield from solve(first, False)
     while outcome.status is Status.CONVERGED and reached < 1.0:
         part = min(1.0, reached + step)
         stage = start.between(first, target, part)
-        trial = solve(stage, stage is target)
+        trial = yield from solve(stage, stage is target)
         if trial.status is Status.CONVERGED:
             outcome, reached, here = trial, part, stage
             step *= 2.0 if len(trial.steps) - 1 <= EASY else 1.0

@@ -7,6 +7,15 @@ that the velocities hardly feel; mixing the last few iterates (Anderson 1965) de
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from nlsolve.contracts.status import Status
+from nlsolve.flow.continuation import Solves
+from nlsolve.flow.observables import divergence
+from nlsolve.flow.state import FlowState
 from nlsolve.solving.anderson_mixing import Mixing
 
 DEPTH = 8  # changes mixed
@@ -15,3 +24,32 @@ DEPTH = 8  # changes mixed
 def pressure_mixing() -> Mixing:
     """Of one increment: undamped, over the last `DEPTH` changes."""
     return Mixing(DEPTH, 1.0)
+
+
+def iterate_pressure(state: FlowState, solve_once: Callable[[], Solves]) -> Solves:
+    """Solve, and iterate the pressure until ‖div v‖ ≤ divergence_tolerance · ‖ε̄‖ where the physics ask for that."""
+    physics, mixing = state.parts.physics, pressure_mixing()
+    asked, most = physics.divergence_tolerance, physics.pressure_iterations
+    outcome = yield from solve_once()
+    if asked is None:
+        return outcome
+    for _ in range(most):
+        if outcome.status is not Status.CONVERGED:
+            return outcome
+        assert state.flow is not None
+        if divergence(state.flow, state.velocity) <= asked:
+            return outcome
+        image = state.flow.pressure(outcome.state)
+        assert image is not None
+        pressure = np.zeros_like(image) if state.pressure is None else state.pressure
+        state.pressure = mixing.next(pressure, image - pressure)
+        state.pressure_iterations += 1
+        outcome = yield from solve_once()
+    reached = divergence(state.flow, state.velocity) if state.flow is not None else np.nan
+    if outcome.status is not Status.CONVERGED or reached <= asked:
+        return outcome
+    detail = (
+        f"‖div V‖/‖ε̄‖ = {reached:.1e} after {most} iterations of the pressure, {asked:g} was asked for: "
+        "raise the penalty, tighten stop.tolerance, or take the dilatation in another form"
+    )
+    return replace(outcome, status=Status.BUDGET_SPENT, detail=detail)

@@ -1,247 +1,200 @@
-"""First state, then increment after increment: one case from its components to its record."""
+"""First state, then increment after increment: the simulation of a flow."""
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
 from nlsolve.contracts.outcome import Outcome
-from nlsolve.contracts.status import SolveError, Status
-from nlsolve.flow.continuation import Stage, walk
+from nlsolve.contracts.problem import NonlinearProblem
+from nlsolve.contracts.scene import Entry, Simulation, Solve, Workload
+from nlsolve.contracts.status import Status
+from nlsolve.flow.continuation import Solves, Stage, walk
+from nlsolve.flow.incompressibility import iterate_pressure
 from nlsolve.flow.momentum import Flow
 from nlsolve.flow.moving_nodes import Markers
 from nlsolve.flow.observables import divergence, nodal_fields, velocity_error, wall_reaction
-from nlsolve.flow.setup import Progress, Record, Setup, reported
-from nlsolve.flow.state import Balance
+from nlsolve.flow.state import FlowParts, FlowState
 from nlsolve.flow.validity import audit
-from nlsolve.results.columns import STEPS
 from nlsolve.series import Array
-from nlsolve.solving.driver import solve
-from nlsolve.solving.ledger import Ledger
-from nlsolve.solving.stopping import StoppingTest
-from nlsolve.solving.tangent import Tangent
 
 
-def march(
-    setup: Setup,
-    listen: Callable[[Progress], None] | None = None,
-    clock: Callable[[], float] = time.process_time,
-) -> Record:
-    """Run one case; every ending, failure included, is in the record. `clock` is what its seconds are told by."""
-    return _March(setup, listen or (lambda progress: None), clock).run()
+class FlowSimulation(Simulation):
+    """The flow of one case: a quasi-static first state reached by continuation, then time steps by implicit Euler.
 
+    A steady flow is its first state; the last stage of the continuation is then solved by the method of the case.
+    """
 
-class _March:
-    """One case on its way: the balance it has got to, and the books of the start and of the march."""
+    prepares = True
 
-    def __init__(self, setup: Setup, listen: Callable[[Progress], None], clock: Callable[[], float]) -> None:
-        self.setup, self.scene, self.listen = setup, setup.scene, listen
-        self.start_ledger, self.ledger = Ledger(clock), Ledger(clock)
-        self.start_tangent = Tangent(setup.linear, None, self.start_ledger)
-        self.tangent = Tangent(setup.linear, setup.refresh, self.ledger)
-        self.balance = Balance(setup, self.ledger)
-        self.rows: list[dict[str, Any]] = []
+    def __init__(self, parts: FlowParts, entry: Entry) -> None:
+        self.parts, self.increments = parts, parts.time.increments
+        self.state = FlowState(parts, entry)
         self.snapshots: list[pd.DataFrame] = []
-        self.increments = self.iterations = 0
-        self.validity_time: float | None = None
-        self.residual_norm = float("nan")
-        self.claimed_wrongly = self.denied_wrongly = 0
-        self.blame: Mapping[str, float] = {}
-        self.sizes: dict[str, float | None] = {"nodes": None, "unknowns": None, "smallest_spacing": None}
+        self.sizes = {"nodes": None, "unknowns": None, "smallest_spacing": None}
         self.markers: Markers | None = None
         self.past: list[Array] = []  # velocities of the same nodes at the ends of the increments, latest first
         self.before: Array | None = None  # velocity one increment earlier
+        self.reached = 0.0  # time of the last solved increment
+        self.probe: int | None = None
 
-    def run(self) -> Record:
-        status, detail = Status.CONVERGED, Status.CONVERGED.sentence
-        try:
-            self.begin()
-            outcome = self.first_state()
-            for k in range(1, self.scene.increments + 1):
-                if outcome.status is not Status.CONVERGED:
-                    break
-                outcome = self.advance(k)
-            status, detail = outcome.status, outcome.detail
-        except SolveError as error:
-            status, detail = error.status, error.detail
-        return self.record(status, detail)
+    def solves(self) -> Solves:
+        self.begin()
+        outcome = yield from self.first_state()
+        for k in range(1, self.increments + 1):
+            if outcome.status is not Status.CONVERGED:
+                break
+            outcome = yield from self.advance(k)
+        return outcome
+
+    def keep(self, solve: Solve, state: Array) -> Mapping[str, float]:
+        assert isinstance(solve.problem, Flow)
+        self.state.keep(solve.problem, state)
+        if solve.preparation is not None:
+            return {}
+        self.reached = solve.time
+        if self.probe is None:
+            return {}
+        place, velocity = self.state.cloud.nodes[self.probe], self.state.velocity[self.probe]
+        return {f"probe_{name}": float(value) for name, value in zip("xyuv", (*place, *velocity), strict=True)}
 
     # The parts of a march.
 
     def begin(self) -> None:
         """The cloud at t = 0, the balance on it, and the node that is watched."""
-        self.initial = cloud = self.scene.cloud(self.setup.law)
+        self.initial = cloud = self.parts.scene.cloud(self.parts.law)
         self.sizes = {
             "nodes": len(cloud.nodes),
             "unknowns": 2 * len(cloud.interior),
             "smallest_spacing": float(cloud.nearest_distance.min()),
         }
-        self.balance.begin(cloud)
-        probe, inside = self.scene.probe, cloud.interior
-        self.probe = (
-            None if probe is None else int(inside[np.linalg.norm(cloud.nodes[inside] - probe, axis=1).argmin()])
-        )
+        self.state.begin(cloud)
+        probe, inside = self.parts.record.probe, cloud.interior
+        if probe is not None:
+            self.probe = int(inside[np.linalg.norm(cloud.nodes[inside] - probe, axis=1).argmin()])
 
-    def first_state(self) -> Outcome:
-        """Quasi-static state at t = 0 by continuation; a steady scene's last stage is the case's own."""
-        steady, start, balance = not self.scene.increments, self.setup.start, self.balance
+    def first_state(self) -> Solves:
+        """Quasi-static state at t = 0 by continuation; a steady flow's last stage is the case's own."""
+        parts, state = self.parts, self.state
 
-        def solve_stage(stage: Stage, last: bool) -> Outcome:
+        def solve_stage(stage: Stage, last: bool) -> Solves:
             if not last:
-                return self.start_stage(stage)
-            if not steady:
-                return balance.iterate_pressure(lambda: self.start_stage(stage))
-            self.take_over()
-            return balance.iterate_pressure(lambda: self.solve_increment(0, balance.flow_of(stage.law)))
+                return self.prepare(stage)
+            if self.increments:
+                return iterate_pressure(state, lambda: self.prepare(stage))
+            return iterate_pressure(state, lambda: self.increment(0, state.flow_of(stage.law)))
 
-        outcome, stage = walk(start, self.setup.law, solve_stage)
-        self.take_over()
+        outcome, stage = yield from walk(parts.start, parts.law, solve_stage)
         if outcome.status is Status.CONVERGED:
-            if self.scene.markers or self.scene.shifting:
-                self.markers = Markers(self.scene, self.setup.discretizer, self.initial, balance.velocity)
+            if parts.motion.markers or parts.motion.shifting:
+                self.markers = Markers(
+                    parts.scene, parts.time.increment, parts.discretizer, self.initial, state.velocity
+                )
             self.record_fields_if_due()
-        elif not steady or stage.load < 1.0 or stage.law is not self.setup.law:
-            detail = f"on the way to the first state, at {start.by} = {stage.value:g}: {outcome.detail}"
-            return Outcome(outcome.status, detail, outcome.state, outcome.residual_norm, ())
+        elif self.increments or stage.load < 1.0 or stage.law is not parts.law:
+            detail = f"on the way to the first state, at {parts.start.by} = {stage.value:g}: {outcome.detail}"
+            return replace(outcome, detail=detail)
         return outcome
 
-    def take_over(self) -> None:
-        """The case's own tangent, in the ordering that the start settled on, unless it is there already."""
-        if not self.tangent.branches:
-            self.tangent = Tangent(self.setup.linear, self.setup.refresh, self.ledger, self.start_tangent.factors)
+    def prepare(self, stage: Stage) -> Solves:
+        """One stage on the way to the first state."""
+        flow = self.state.flow_of(stage.law, load=stage.load)
+        preparation = self.parts.start.preparation(self.parts.starter, self.parts.budget.iterations)
+        return (yield Solve(flow, flow.unknowns(self.state.guess), preparation=preparation))
 
-    def start_stage(self, stage: Stage) -> Outcome:
-        """The starting method on one stage; a state it converges to is kept."""
-        setup = self.setup
-        with self.start_ledger.entry("stage"):
-            flow = self.balance.flow_of(stage.law, load=stage.load)
-            outcome = solve(
-                flow,
-                setup.starter,
-                self.start_tangent,
-                flow.unknowns(self.balance.guess),
-                StoppingTest(kind="residual", tolerance=setup.start.tolerance),
-                setup.start.budget(setup.budget),
-                self.start_ledger,
-            )
-        self.blame = outcome.blame
-        if outcome.status is Status.CONVERGED:
-            self.balance.keep(flow, outcome.state)
-        return outcome
-
-    def advance(self, k: int) -> Outcome:
-        """One time step: move the nodes if the scene moves them, then solve the balance at its end."""
-        balance, predictor = self.balance, self.setup.predictor
-        carry = balance.move_to(k * self.scene.increment, self.before)
+    def advance(self, k: int) -> Solves:
+        """One time step: move the nodes if they move, then solve the balance at its end."""
+        state, predictor = self.state, self.parts.predictor
+        carry = state.move_to(k * self.parts.time.increment, self.before)
         if carry is not None:
             self.past = [velocity + carry @ velocity for velocity in self.past]
-        previous = balance.velocity
+        previous = state.velocity
         self.past = [previous, *self.past][: predictor.depth]
-        balance.guess = predictor.guess(self.past)
-        inertia = balance.inertia_from(previous)
-        outcome = balance.iterate_pressure(lambda: self.solve_increment(k, balance.flow_of(self.setup.law, inertia)))
+        state.guess = predictor.guess(self.past)
+        inertia = state.inertia_from(previous)
+        outcome = yield from iterate_pressure(state, lambda: self.increment(k, state.flow_of(self.parts.law, inertia)))
         if outcome.status is Status.CONVERGED:
             self.before = previous
             if self.markers is not None:
-                self.markers.advance(balance.cloud, balance.velocity, balance.time)
+                self.markers.advance(state.cloud, state.velocity, state.time)
             self.record_fields_if_due()
         return outcome
 
-    def solve_increment(self, k: int, flow: Flow) -> Outcome:
-        """The case's own method on one increment; its rows, counts and largest residual are kept."""
-        setup = self.setup
-        guess = setup.start.disturbed(flow, flow.unknowns(self.balance.guess), k)
-        outcome = solve(flow, setup.solver, self.tangent, guess, setup.stop, setup.budget, self.ledger)
-        solved = outcome.status is Status.CONVERGED
-        self.iterations += max(0, len(outcome.steps) - 1)
-        self.claimed_wrongly += outcome.claimed_wrongly
-        self.denied_wrongly += outcome.denied_wrongly
-        self.blame = outcome.blame
-        self.rows += [{"increment": k, "time": self.balance.time, "accepted": False, **row} for row in outcome.steps]
-        if self.validity_time is None and self.scene.increments and self.tangent.branches > 1:
-            self.validity_time = (k - 1) * self.scene.increment
-        before = self.residual_norm if k else np.nan  # of a steady scene the last solve counts: a start may repeat it
-        self.residual_norm = float(np.fmax(before, outcome.residual_norm))
-        if solved:
-            self.balance.keep(flow, outcome.state)
-            self.increments = max(k, 1)
-            self.rows[-1]["accepted"] = True
-            if self.probe is not None:
-                place, velocity = self.balance.cloud.nodes[self.probe], self.balance.velocity[self.probe]
-                seen = zip(("x", "y", "u", "v"), (*place, *velocity), strict=True)
-                self.rows[-1] |= {f"probe_{name}": value for name, value in seen}
-        self.listen(
-            Progress(
-                max(k, self.increments),
-                max(self.scene.increments, 1),
-                self.tangent.branches,
-                self.ledger.counts["factorization"],
-            )
-        )
-        return outcome
+    def increment(self, k: int, flow: Flow) -> Solves:
+        """The balance at the end of one increment, for the method of the case."""
+        guess = self.parts.start.disturbed(flow, flow.unknowns(self.state.guess), k)
+        return (yield Solve(flow, guess, k, self.state.time))
 
     # What is left behind.
 
     def record_fields_if_due(self) -> None:
         """Keep the fields when this time, to half an increment, is one of those asked for, or the last."""
-        setup, scene, now = self.setup, self.scene, self.balance
-        asked = (*setup.record, scene.horizon or 0.0)
-        if any(abs(now.time - moment) < 0.5 * scene.increment for moment in asked):
+        parts, now = self.parts, self.state
+        asked = (*parts.record.times, parts.time.horizon or 0.0)
+        if any(abs(now.time - moment) < 0.5 * parts.time.increment for moment in asked):
             assert now.flow is not None
-            fields = nodal_fields(scene, setup.discretizer, now.flow, now.velocity, self.initial, now.time)
+            fields = nodal_fields(parts.scene, parts.discretizer, now.flow, now.velocity, self.initial, now.time)
             places = np.full_like(self.initial.nodes, np.nan) if self.markers is None else self.markers.places
             self.snapshots.append(fields.assign(marker_x=places[:, 0], marker_y=places[:, 1]))
 
-    def record(self, status: Status, detail: str) -> Record:
-        """The row of the case, whatever its ending; what is measured on fields is of the last solved increment."""
-        ledger, start, balance = self.ledger, self.start_ledger, self.balance
-        reached = self.increments * self.scene.increment if self.scene.increments else 0.0
-        validity = self.validity_time
-        if validity is None and self.scene.increments and self.increments:
-            validity = reached  # the first tangent served to the end
-        message = detail if detail == status.sentence or status is Status.CONVERGED else f"{status.sentence}; {detail}"
-        if "blame_x" in self.blame:
-            x, y, rate = (self.blame[f"blame_{name}"] for name in ("x", "y", "rate"))
-            message += f"; the residual is largest at ({x:.3g}, {y:.3g}), where ε̄ = {rate:.2g} 1/s"
-        summary: dict[str, Any] = {
-            "status": status.word,
-            "message": message,
-            "said_converged_but_is_not": self.claimed_wrongly,
-            "said_failed_but_is": self.denied_wrongly,
-            **self.blame,
-            **self.sizes,
-            "cloud_quality": None if balance.moving is None else balance.moving.quality,
-            "increments": self.increments,
-            "time": reached,
-            "iterations": self.iterations,
-            "pressure_iterations": balance.pressure_iterations if self.scene.divergence else None,
-            "branches": self.tangent.branches,
-            "validity_time": validity,
-            **ledger.work(),
-            **reported(self.rows),
-            "start_factorizations": start.counts["factorization"],
-            "start_triangular_solves": start.counts["triangular_solve"],
-            "start_residuals": start.counts["residual"],
-            "seconds_start": start.seconds["stage"],
-            "seconds_all": ledger.seconds["method"] + ledger.seconds["operators"] + start.seconds["stage"],
-            **self.tangent.facts(),
-            "residual_norm": self.residual_norm,
+    def fields(self) -> pd.DataFrame:
+        return pd.concat(self.snapshots, ignore_index=True) if self.snapshots else pd.DataFrame()
+
+    def measured(self, outcome: Outcome) -> Mapping[str, Any]:
+        """Time, divergence, errors, the reaction of the moving wall and the audits of the last solved increment."""
+        parts, state = self.parts, self.state
+        iterated = parts.physics.divergence_tolerance is not None
+        found: dict[str, Any] = {
+            "cloud_quality": None if state.moving is None else state.moving.quality,
+            "time": self.reached,
+            "pressure_iterations": state.pressure_iterations if iterated else None,
         }
-        flow, unknowns = balance.flow, None
-        if flow is not None:
-            unknowns, discretizer = balance.unknowns, self.setup.discretizer
-            velocity = flow.velocity(unknowns)
-            change = None if self.before is None else (velocity - self.before) / self.scene.increment
-            summary["divergence"] = divergence(flow, velocity)
-            summary |= velocity_error(self.scene, flow, velocity, reached)
-            summary |= wall_reaction(self.scene, discretizer, flow, velocity, reached)
-            estimate = {"estimate": lambda: balance.error_estimate(velocity, self.before)}
-            solved = status is Status.CONVERGED
-            summary |= audit(self.scene, discretizer, flow, velocity, change, reached, **(estimate if solved else {}))
-        steps = pd.DataFrame(self.rows, columns=[name for name in STEPS if name != "case"])
-        fields = pd.concat(self.snapshots, ignore_index=True) if self.snapshots else pd.DataFrame()
-        return Record(summary, steps, fields, flow, unknowns)
+        if state.flow is None:
+            return found
+        flow, velocity, time = state.flow, state.flow.velocity(state.unknowns), self.reached
+        change = None if self.before is None else (velocity - self.before) / parts.time.increment
+        found["divergence"] = divergence(flow, velocity)
+        found |= velocity_error(parts.scene, flow, velocity, time)
+        found |= wall_reaction(parts.scene, parts.motion, parts.discretizer, flow, velocity, time)
+
+        def estimate() -> float:
+            solved = outcome.status is Status.CONVERGED
+            return state.error_estimate(velocity, self.before) if solved else float("nan")
+
+        return found | audit(parts, flow, velocity, change, time, estimate)
+
+    def place(self, blame: Mapping[str, float]) -> str:
+        if "blame_x" not in blame:
+            return ""
+        x, y, rate = (blame[f"blame_{name}"] for name in ("x", "y", "rate"))
+        return f"the residual is largest at ({x:.3g}, {y:.3g}), where ε̄ = {rate:.2g} 1/s"
+
+    # What is told before anything is solved.
+
+    def sample(self) -> tuple[NonlinearProblem, Array]:
+        """The balance at t = 0, and the state one Newton step away from rest under the easiest law of the way to the
+        first state: where that law is Newtonian, the flow of a Newtonian material.
+        """
+        parts, state = self.parts, self.state
+        self.begin()
+        first = parts.start.stages(parts.law)[0]
+        easiest = state.flow_of(first.law, load=first.load)
+        rest = easiest.unknowns(state.velocity)
+        factors = parts.linear.factorize(easiest.jacobian(rest))
+        u = rest - factors.solve(easiest.residual(rest))
+        state.keep(easiest, u)
+        return state.flow_of(parts.law), u
+
+    def workload(self) -> Workload:
+        increments = max(1, self.increments)
+        clouds = 1 + (increments if self.parts.motion.moving else 0)
+        return Workload(increments, clouds, len(self.parts.start.stages(self.parts.law)))
+
+    def diagnostics(self) -> list[dict[str, Any]]:
+        cloud = self.parts.scene.cloud(self.parts.law)
+        found = self.parts.discretizer.diagnostics(cloud) or [{"operator": "this discretizer gives no diagnostics"}]
+        return [{"nodes": len(cloud.nodes), **row} for row in found]

@@ -13,7 +13,8 @@ from scipy.spatial import cKDTree
 
 from nlsolve.contracts.continuum.cloud import Cloud
 from nlsolve.contracts.continuum.discretizer import Discretizer, Operators
-from nlsolve.contracts.continuum.scene import Scene
+from nlsolve.contracts.continuum.geometry import Geometry
+from nlsolve.contracts.continuum.terms import NodeMotion
 from nlsolve.contracts.status import SolveError, Status
 from nlsolve.series import Array
 
@@ -69,8 +70,10 @@ class Markers:
     the places are of fourth order in Δt once three have passed, linearly at moving ones, second order as their motion.
     """
 
-    def __init__(self, scene: Scene, discretizer: Discretizer, initial: Cloud, velocity: Array) -> None:
-        self.scene, self.discretizer, self.initial = scene, discretizer, initial
+    def __init__(
+        self, scene: Geometry, increment: float, discretizer: Discretizer, initial: Cloud, velocity: Array
+    ) -> None:
+        self.scene, self.increment, self.discretizer, self.initial = scene, increment, discretizer, initial
         self.places = initial.nodes.copy()  # (N, 2) [mm]; NaN once a marker has left the cloud
         self._known = [(initial.nodes, velocity)]
 
@@ -83,7 +86,7 @@ class Markers:
             middle = [(cloud.nodes, halfway([velocity for _, velocity in self._known]))]
         inside = self.initial.interior
         followed = inside[np.isfinite(self.places[inside, 0])]
-        moved = runge_kutta(self.places[followed], [start], middle, [end], self.scene.increment, self._velocity_at)
+        moved = runge_kutta(self.places[followed], [start], middle, [end], self.increment, self._velocity_at)
         distance, nearest = cKDTree(cloud.nodes).query(moved)
         lost = (distance > LOST * cloud.nearest_distance[nearest]) | (moved != within(cloud.nodes, moved)).any(axis=1)
         moved[lost] = np.nan
@@ -122,41 +125,44 @@ class MovingNodes:
     Shifted nodes are not material points any more; markers are.
     """
 
-    def __init__(self, scene: Scene, discretizer: Discretizer, initial: Cloud) -> None:
-        self.scene, self.discretizer, self.initial = scene, discretizer, initial
+    def __init__(
+        self, scene: Geometry, motion: NodeMotion, increment: float, discretizer: Discretizer, initial: Cloud
+    ) -> None:
+        self.scene, self.motion, self.increment = scene, motion, increment
+        self.discretizer, self.initial = discretizer, initial
         self.quality = 1.0
         self.searches = 0
         self._operators: Operators
         self._found: Neighbourhoods | None = None
 
     def operators(self, cloud: Cloud, volumetric: bool) -> Operators:
-        """Of the moved cloud, with the neighbours found last while none has parted by more than the scene's `skin`
+        """Of the moved cloud, with the neighbours found last while none has parted by more than the `skin`
         (lists of Verlet 1967) and while the discretizer can keep them.
         """
         operators = None
-        if self._found is not None and self._found.parted(cloud.nodes) <= self.scene.skin:
+        if self._found is not None and self._found.parted(cloud.nodes) <= self.motion.skin:
             operators = self.discretizer.moved(self._operators, cloud)
         if operators is None:
             operators = self.discretizer.operators(cloud, volumetric)
-            keeps = self.scene.skin and operators.neighbours is not None
+            keeps = self.motion.skin and operators.neighbours is not None
             self._found = Neighbourhoods(cloud) if keeps else None
             self.searches += 1
         self._operators = operators
         return operators
 
     def move(self, cloud: Cloud, velocity: Array, before: Array | None, time: float) -> tuple[Cloud, Any]:
-        """x_{k+1} = x_k + Δt (3/2 v_k − 1/2 v_{k−1}) (Adams-Bashforth), then shifted if the scene asks for it.
+        """x_{k+1} = x_k + Δt (3/2 v_k − 1/2 v_{k−1}) (Adams-Bashforth), then shifted if the motion asks for it.
 
         Returns the cloud at `time` and, when it was shifted, the matrix (N, N) by which nodal values change with it:
         values there less values here, so that what is hardly shifted is hardly smoothed.
         Raises SolveError (bad cloud) when two nodes have come too close.
         """
         step = velocity if before is None else 1.5 * velocity - 0.5 * before
-        nodes = cloud.nodes + self.scene.increment * step
+        nodes = cloud.nodes + self.increment * step
         nodes[self.initial.boundary] = self.scene.boundary_position(self.initial, time)
         moved, carry = cloud.moved_to(nodes), None
-        if self.scene.shifting:
-            moved = moved.moved_to(nodes + shifts(moved, self.initial.nearest_distance, self.scene.shifting))
+        if self.motion.shifting:
+            moved = moved.moved_to(nodes + shifts(moved, self.initial.nearest_distance, self.motion.shifting))
             values = self.discretizer.values
             carry = values(nodes, moved.nodes) - values(nodes, nodes)
         self._watch(moved, time)
@@ -171,8 +177,8 @@ class MovingNodes:
             raise SolveError(
                 Status.BAD_CLOUD,
                 f"at t = {time:.6g} s the node at ({x:.6g}, {y:.6g}) is {self.quality:.2g} times as far from its "
-                'neighbour as at t = 0: raise shifting, shorten the increment, or use motion_of_nodes = "fixed" with '
-                "markers = true",
+                "neighbour as at t = 0: raise motion.shifting, shorten time.increment, or use "
+                'motion = { nodes = "fixed", markers = true }',
             )
 
 

@@ -7,15 +7,16 @@ import pandas as pd
 
 from nlsolve.contracts.continuum.cloud import Cloud, Indices
 from nlsolve.contracts.continuum.discretizer import Discretizer
+from nlsolve.contracts.continuum.geometry import Geometry
 from nlsolve.contracts.continuum.law import CONTRACTION, rate_squared
-from nlsolve.contracts.continuum.scene import Scene
+from nlsolve.contracts.continuum.terms import NodeMotion
 from nlsolve.contracts.linear_solver import LinearSolver
 from nlsolve.contracts.status import SolveError, Status
 from nlsolve.flow.momentum import Flow
 from nlsolve.series import Array
 
 
-def velocity_error(scene: Scene, flow: Flow, velocity: Array, time: float) -> dict[str, float]:
+def velocity_error(scene: Geometry, flow: Flow, velocity: Array, time: float) -> dict[str, float]:
     """‖v − v_exact‖₂ / ‖v_exact‖₂ over all nodes and over those inside; empty where the scene has no exact solution."""
     exact = scene.exact(flow.law, flow.cloud.nodes, time)
     if exact is None:
@@ -57,9 +58,11 @@ def divergence(flow: Flow, velocity: Array) -> float:
     return float(np.sqrt(np.mean(dilatation**2) / np.mean(squared)))
 
 
-def wall_reaction(scene: Scene, discretizer: Discretizer, flow: Flow, velocity: Array, time: float) -> dict[str, float]:
+def wall_reaction(
+    scene: Geometry, motion: NodeMotion, discretizer: Discretizer, flow: Flow, velocity: Array, time: float
+) -> dict[str, float]:
     """Force, and torque about the origin, of the moving wall on the material, with errors; empty without a contour."""
-    contour = scene.contour()
+    contour = scene.contour(motion)
     if contour is None:
         return {}
     u = flow.unknowns(velocity)
@@ -127,7 +130,7 @@ def _inside(contour: Array, cloud: Cloud) -> Indices:
 
 
 def nodal_fields(
-    scene: Scene, discretizer: Discretizer, flow: Flow, velocity: Array, initial: Cloud, time: float
+    scene: Geometry, discretizer: Discretizer, flow: Flow, velocity: Array, initial: Cloud, time: float
 ) -> pd.DataFrame:
     """A row a node: place at t = 0 and now, velocity, strain rates, exact velocity (columns of `FIELDS`)."""
     nodes = flow.cloud.nodes

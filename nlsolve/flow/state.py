@@ -1,42 +1,66 @@
-"""The balance of momentum at one moment: the nodes, their operators, the pressure, and the state solved for last."""
+"""A flow at one moment: its nodes, their operators, the pressure, and the velocity solved for last."""
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 from scipy.spatial import cKDTree
 
 from nlsolve.contracts.continuum.cloud import Cloud
-from nlsolve.contracts.continuum.discretizer import Operators
+from nlsolve.contracts.continuum.discretizer import Discretizer, Operators
+from nlsolve.contracts.continuum.geometry import Geometry
 from nlsolve.contracts.continuum.law import ConstitutiveLaw, rate_squared
-from nlsolve.contracts.outcome import Outcome
-from nlsolve.contracts.status import Status
-from nlsolve.flow.incompressibility import pressure_mixing
+from nlsolve.contracts.continuum.terms import NodeMotion, Physics, Recording, TimeSteps
+from nlsolve.contracts.linear_solver import LinearSolver
+from nlsolve.contracts.nonlinear_solver import NonlinearSolver
+from nlsolve.contracts.rules.predictor import Predictor
+from nlsolve.contracts.rules.refresh import RefreshRule
+from nlsolve.contracts.scene import Entry
+from nlsolve.flow.continuation import Start
 from nlsolve.flow.momentum import Convection, Flow, Inertia
 from nlsolve.flow.moving_nodes import MovingNodes
-from nlsolve.flow.observables import discretization_error, divergence
-from nlsolve.flow.setup import Setup
+from nlsolve.flow.observables import discretization_error
 from nlsolve.series import Array
-from nlsolve.solving.ledger import Ledger
+from nlsolve.solving.stopping import Budget, StoppingTest
 
 
-class Balance:
+@dataclass(frozen=True)
+class FlowParts:
+    """The components that a flow is made of, by the names of their sections, with the defaults of a study."""
+
+    scene: Geometry
+    law: ConstitutiveLaw
+    discretizer: Discretizer
+    linear: LinearSolver
+    solver: NonlinearSolver
+    refresh: RefreshRule
+    starter: NonlinearSolver
+    predictor: Predictor
+    counterpart: Discretizer | None = None
+    physics: Physics = field(default_factory=Physics)
+    time: TimeSteps = field(default_factory=TimeSteps)
+    motion: NodeMotion = field(default_factory=NodeMotion)
+    start: Start = field(default_factory=Start)
+    stop: StoppingTest = field(default_factory=StoppingTest)
+    budget: Budget = field(default_factory=Budget)
+    record: Recording = field(default_factory=Recording)
+
+
+class FlowState:
     """What the equations of a case are now, and the last state that solved them.
 
     time : now [s].
-    cloud, operators, gradient : the nodes, B, S, B_θ and S_θ on them, and ∂/∂x, ∂/∂y where the scene convects.
-    pressure : at the volume points, shape (L,) [MPa], iterated where the scene asks for a divergence; None before.
+    cloud, operators, gradient : the nodes, B, S, B_θ and S_θ on them, and ∂/∂x, ∂/∂y where convection is kept.
+    pressure : at the volume points, shape (L,) [MPa], iterated where a divergence_tolerance is asked for; None before.
     velocity, guess : of the nodes, shape (N, 2) [mm/s]: solved for last, and where the next solve begins.
     flow, unknowns : solved last; None, and absent, before the first.
     """
 
-    def __init__(self, setup: Setup, ledger: Ledger) -> None:
-        self.setup, self.scene, self.ledger = setup, setup.scene, ledger
-        self.volumetric = bool(self.scene.penalty)
+    def __init__(self, parts: FlowParts, entry: Entry) -> None:
+        self.parts, self.scene, self.entry = parts, parts.scene, entry
+        self.volumetric = bool(parts.physics.penalty)
         self.time = 0.0
         self.pressure: Array | None = None
         self.pressure_iterations = 0
@@ -49,13 +73,15 @@ class Balance:
     def begin(self, cloud: Cloud) -> None:
         """The cloud at t = 0, its operators, and rest inside."""
         self.cloud = cloud
-        if self.scene.motion_of_nodes == "lagrangian":
-            self.moving = MovingNodes(self.scene, self.setup.discretizer, cloud)
+        if self.parts.motion.moving:
+            self.moving = MovingNodes(
+                self.parts.scene, self.parts.motion, self.parts.time.increment, self.parts.discretizer, cloud
+            )
         self.build_operators()
         self.velocity = self.guess = np.zeros_like(cloud.nodes)
 
     def move_to(self, time: float, before: Array | None) -> Any:
-        """The nodes and their operators at this time, if the scene moves them; velocities come along to shifted nodes.
+        """The nodes and their operators at this time, if they move; velocities come along to shifted nodes.
 
         before : velocity (N, 2) one increment earlier than the last.
         Returns the matrix (N, N) by which nodal values change with shifted nodes, else None.
@@ -72,20 +98,20 @@ class Balance:
     def build_operators(self) -> None:
         """Of the nodes now; the pressure comes along to the new volume points."""
         before = self.operators if self.pressure is not None else None
-        with self.ledger.entry("operators"):
+        with self.entry("operators"):
             if self.moving is None:
-                self.operators = self.setup.discretizer.operators(self.cloud, self.volumetric)
+                self.operators = self.parts.discretizer.operators(self.cloud, self.volumetric)
             else:
                 self.operators = self.moving.operators(self.cloud, self.volumetric)
-            self.gradient = self.setup.discretizer.gradient(self.cloud) if self.scene.convection else None
+            self.gradient = self.parts.discretizer.gradient(self.cloud) if self.parts.physics.convection else None
         if before is not None:
             self.pressure = self.between_volume_points(before, self.operators) @ self.pressure
 
     def inertia_from(self, before: Array | None) -> Inertia | None:
-        """ρ (V − V_k)/Δt with V_k = `before`, where the scene keeps it."""
-        if before is None or not self.scene.inertia:
+        """ρ (V − V_k)/Δt with V_k = `before`, where the physics keep it."""
+        if before is None or not self.parts.physics.inertia:
             return None
-        return Inertia(self.scene.density / self.scene.increment, before)
+        return Inertia(self.parts.physics.density / self.parts.time.increment, before)
 
     def flow_of(
         self,
@@ -99,16 +125,21 @@ class Balance:
         pressure = self.pressure
         if others is not None and pressure is not None:
             pressure = self.between_volume_points(self.operators, others) @ pressure
-        body_force = self.scene.body_force(self.cloud.nodes[self.cloud.interior], law)
+        physics = self.parts.physics
+        body_force = self.scene.body_force(self.cloud.nodes[self.cloud.interior], law, physics)
+        modulus: float | Array = 0.0
+        if self.volumetric:
+            rate_squared = self.rate_squared_at_volume_points(operators)
+            modulus = physics.penalty_modulus(law, self.scene.reference_rate, rate_squared)
         return Flow(
             self.cloud,
             operators,
             law,
             load * self.scene.boundary_velocity(self.cloud, law, self.time),
-            self.scene.penalty_modulus(law, self.rate_squared_at_volume_points(operators)) if self.volumetric else 0.0,
+            modulus,
             pressure,
             inertia,
-            Convection(self.scene.density, self.gradient) if self.gradient is not None else None,
+            Convection(physics.density, self.gradient) if self.gradient is not None else None,
             None if body_force is None else load * body_force,
         )
 
@@ -121,62 +152,17 @@ class Balance:
         """The matrix that takes pressures from the volume points of some operators to those of others."""
         assert here.volume_points is not None
         assert there.volume_points is not None
-        return self.setup.discretizer.values(here.volume_points, there.volume_points)
+        return self.parts.discretizer.values(here.volume_points, there.volume_points)
 
     def keep(self, flow: Flow, unknowns: Array) -> None:
         """A solved state: what is measured, and where the next solve begins."""
         self.flow, self.unknowns = flow, unknowns
         self.velocity = self.guess = flow.velocity(unknowns)
 
-    def iterate_pressure(self, solve_once: Callable[[], Outcome]) -> Outcome:
-        """Solve, and iterate the pressure until ‖div v‖ ≤ divergence · ‖ε̄‖ where the scene asks for that."""
-        asked, most, mixing = self.scene.divergence, self.setup.budget.pressures, pressure_mixing()
-        outcome = solve_once()
-        if asked is None:
-            return outcome
-        for _ in range(most):
-            if outcome.status is not Status.CONVERGED:
-                return outcome
-            assert self.flow is not None
-            if divergence(self.flow, self.velocity) <= asked:
-                return outcome
-            image = self.flow.pressure(outcome.state)
-            assert image is not None
-            pressure = np.zeros_like(image) if self.pressure is None else self.pressure
-            self.pressure = mixing.next(pressure, image - pressure)
-            self.pressure_iterations += 1
-            outcome = solve_once()
-        reached = divergence(self.flow, self.velocity) if self.flow is not None else np.nan
-        if outcome.status is not Status.CONVERGED or reached <= asked:
-            return outcome
-        detail = (
-            f"‖div V‖/‖ε̄‖ = {reached:.1e} after {most} iterations of the pressure, {asked:g} was asked for: "
-            "raise the penalty, tighten stop.tolerance, or take the dilatation in another form"
-        )
-        return replace(outcome, status=Status.BUDGET_SPENT, detail=detail)
-
     def error_estimate(self, velocity: Array, before: Array | None) -> float:
         """By the counterpart, of the velocity at the end of an increment and `before` it; NaN without one."""
-        if self.setup.counterpart is None:
+        if self.parts.counterpart is None:
             return float("nan")
-        others = self.setup.counterpart.operators(self.cloud, self.volumetric)
-        flow = self.flow_of(self.setup.law, self.inertia_from(before), others=others)
-        return discretization_error(flow, velocity, self.setup.linear)
-
-
-def sample(setup: Setup, clock: Callable[[], float] = time.process_time) -> tuple[Flow, Array, Ledger]:
-    """The balance of a case at t = 0, a state for it, and the books of its operators; nothing is iterated.
-
-    The state is one Newton step away from rest under the easiest law of the way to the first state: where that law is
-    Newtonian, the flow of a Newtonian material. Raises SolveError.
-    """
-    ledger = Ledger(clock)
-    balance = Balance(setup, ledger)
-    balance.begin(setup.scene.cloud(setup.law))
-    first = setup.start.stages(setup.law)[0]
-    easiest = balance.flow_of(first.law, load=first.load)
-    rest = easiest.unknowns(balance.velocity)
-    factors = setup.linear.factorize(easiest.jacobian(rest))
-    state = rest - factors.solve(easiest.residual(rest))
-    balance.keep(easiest, state)
-    return balance.flow_of(setup.law), state, ledger
+        others = self.parts.counterpart.operators(self.cloud, self.volumetric)
+        flow = self.flow_of(self.parts.law, self.inertia_from(before), others=others)
+        return discretization_error(flow, velocity, self.parts.linear)

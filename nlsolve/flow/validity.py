@@ -16,12 +16,11 @@ from typing import Any
 import numpy as np
 from scipy.spatial import cKDTree
 
-from nlsolve.contracts.continuum.discretizer import Discretizer
 from nlsolve.contracts.continuum.law import CONTRACTION, rate_squared, stress
-from nlsolve.contracts.continuum.scene import Scene
 from nlsolve.contracts.status import SolveError
 from nlsolve.flow.momentum import Flow
 from nlsolve.flow.observables import divergence
+from nlsolve.flow.state import FlowParts
 from nlsolve.results.verdicts import ACCEPTED
 from nlsolve.series import Array
 
@@ -52,8 +51,8 @@ class Limit:
 
 
 LIMITS: dict[str, Limit] = {
-    "audit.inertia": Limit(0.05, "inertia is not negligible: set inertia = true"),
-    "audit.convection": Limit(0.05, "convection is not negligible: set convection = true"),
+    "audit.inertia": Limit(0.05, "inertia is not negligible: set physics.inertia = true"),
+    "audit.convection": Limit(0.05, "convection is not negligible: set physics.convection = true"),
     "audit.compressibility": Limit(0.05, "the material is compressed: raise the penalty, or ask for a divergence"),
     "audit.regularization_strain": Limit(0.02, "the regularization rules much of the flow: lower law.regularization"),
     "audit.residual": Limit(1e-5, "the residual is not small beside the stresses: tighten stop.tolerance"),
@@ -68,8 +67,7 @@ LIMITS: dict[str, Limit] = {
 
 
 def audit(
-    scene: Scene,
-    discretizer: Discretizer,
+    parts: FlowParts,
     flow: Flow,
     velocity: Array,
     change: Array | None,
@@ -83,8 +81,8 @@ def audit(
     estimate : of the relative error of the velocity inside, by another discretisation; NaN where there is none.
     """
     try:
-        gradient = discretizer.gradient(flow.cloud)
-        to_nodes = discretizer.values(flow.operators.strain_points, flow.cloud.nodes)
+        gradient = parts.discretizer.gradient(flow.cloud)
+        to_nodes = parts.discretizer.values(flow.operators.strain_points, flow.cloud.nodes)
         error = estimate()
     except SolveError as refusal:
         return {"doubt": f"the audits could not be made: {refusal.detail}"}
@@ -92,14 +90,14 @@ def audit(
     slopes = np.stack([derivative @ velocity for derivative in gradient])  # (2, N, 2): ∂/∂x and ∂/∂y of u, v
     stress_slopes = _stress_slopes(flow, strain_rate, gradient, to_nodes)
     found = {
-        **_accelerations(scene, flow, velocity, change, slopes, _size(stress_slopes)),
+        **_accelerations(parts, flow, velocity, change, slopes, _size(stress_slopes)),
         "audit.compressibility": _compressibility(flow, velocity, slopes),
         **_regularization(flow, strain_rate),
         "audit.residual": _residual(flow, velocity),
-        "audit.balance": _balance(scene, flow, velocity, change, slopes, stress_slopes),
+        "audit.balance": _balance(parts, flow, velocity, change, slopes, stress_slopes),
         "audit.resolution": _resolution(flow, velocity, slopes),
         "velocity_error_estimate": error,
-        "audit.heating": _heating(scene, flow, strain_rate, time),
+        "audit.heating": _heating(parts, flow, strain_rate, time),
     }
     doubts = [limit.sentence for name, limit in LIMITS.items() if limit.doubt and found[name] > limit.largest]
     return found | {"doubt": "; ".join(doubts)}
@@ -121,7 +119,7 @@ def _size(stress_slopes: Array) -> float:
 
 
 def _balance(
-    scene: Scene, flow: Flow, velocity: Array, change: Array | None, slopes: Array, stress_slopes: Array
+    parts: FlowParts, flow: Flow, velocity: Array, change: Array | None, slopes: Array, stress_slopes: Array
 ) -> float:
     """‖div S + f − ρ dV/dt‖₂ / ‖∇S‖₂ over the interior nodes, where no pressure acts: the balance that was solved, once
     more by operators that had no part in it. Steady spin: up to 0.17 where the error inside is below 5 %.
@@ -131,31 +129,31 @@ def _balance(
     inside = flow.cloud.interior
     (xx_x, _, xy_x), (_, yy_y, xy_y) = stress_slopes
     force = np.stack([xx_x + xy_y, xy_x + yy_y], axis=1)
-    body_force = scene.body_force(flow.cloud.nodes[inside], flow.law)
+    body_force = parts.scene.body_force(flow.cloud.nodes[inside], flow.law, parts.physics)
     if body_force is not None:
         force = force + body_force
-    if scene.inertia and change is not None:
-        force = force - scene.density * change[inside]
-    if scene.convection:
-        force = force - scene.density * np.einsum("na,anc->nc", velocity, slopes)[inside]
+    if parts.physics.inertia and change is not None:
+        force = force - parts.physics.density * change[inside]
+    if parts.physics.convection:
+        force = force - parts.physics.density * np.einsum("na,anc->nc", velocity, slopes)[inside]
     stresses = np.abs(flow.stress_at_points(flow.unknowns(velocity))).max()
     uniform = ROUNDING * stresses * np.sqrt(len(inside)) / np.ptp(flow.cloud.nodes, axis=0).max()
     return _ratio(np.linalg.norm(force), max(_size(stress_slopes), uniform))
 
 
 def _accelerations(
-    scene: Scene, flow: Flow, velocity: Array, change: Array | None, slopes: Array, stress_slopes: float
+    parts: FlowParts, flow: Flow, velocity: Array, change: Array | None, slopes: Array, stress_slopes: float
 ) -> dict[str, float]:
     """‖ρ ∂V/∂t‖/‖∇S‖ and ‖ρ (V·∇) V‖/‖∇S‖ over the interior nodes, each where the scene has no such term."""
     inside = flow.cloud.interior
     missing = {}
-    if change is not None and not scene.inertia:
+    if change is not None and not parts.physics.inertia:
         missing["audit.inertia"] = change
-    if scene.motion_of_nodes == "fixed" and not scene.convection:
+    if not parts.motion.moving and not parts.physics.convection:
         missing["audit.convection"] = np.einsum("na,anc->nc", velocity, slopes)
     nothing = {"audit.inertia": np.nan, "audit.convection": np.nan}
     return nothing | {
-        name: _ratio(scene.density * np.linalg.norm(acceleration[inside]), stress_slopes)
+        name: _ratio(parts.physics.density * np.linalg.norm(acceleration[inside]), stress_slopes)
         for name, acceleration in missing.items()
     }
 
@@ -211,7 +209,9 @@ def _resolution(flow: Flow, velocity: Array, slopes: Array) -> float:
     return _ratio(np.linalg.norm(change - explained), np.linalg.norm(change))
 
 
-def _heating(scene: Scene, flow: Flow, strain_rate: Array, time: float) -> float:
+def _heating(parts: FlowParts, flow: Flow, strain_rate: Array, time: float) -> float:
     """max S:ε̇/(ρ c_p) · time [K], in a steady scene over a time 2π/reference rate (a turn of a tool)."""
     power = CONTRACTION @ (stress(flow.law, strain_rate) * strain_rate)
-    return float(power.max() / (scene.density * HEAT_CAPACITY)) * (time or 2.0 * np.pi / scene.reference_rate)
+    return float(power.max() / (parts.physics.density * HEAT_CAPACITY)) * (
+        time or 2.0 * np.pi / parts.scene.reference_rate
+    )

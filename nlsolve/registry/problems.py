@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from difflib import get_close_matches
@@ -173,8 +172,7 @@ def _chosen(candidates: list[type[BaseModel]], document: Any) -> type[BaseModel]
 
 def _models_in(annotation: Any) -> list[type[BaseModel]]:
     """The models mentioned in a type: Annotated[A | B, …], list[A], …; of a contract, those that are installed."""
-    contracts = itertools.chain(*CONTRACTS.values())
-    if isinstance(annotation, type) and issubclass(annotation, Component) and annotation in contracts:
+    if isinstance(annotation, type) and issubclass(annotation, Component) and annotation in CONTRACTS.values():
         return list(load_registry().classes(annotation.noun).values())
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         return [annotation]

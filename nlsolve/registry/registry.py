@@ -7,7 +7,6 @@ offered twice belongs to nobody until one of the two packages is removed.
 from __future__ import annotations
 
 import inspect
-import itertools
 from collections.abc import Mapping
 from dataclasses import dataclass
 from difflib import get_close_matches
@@ -23,29 +22,28 @@ from pydantic_core import PydanticCustomError, to_jsonable_python
 from nlsolve.contracts.component import Component
 from nlsolve.contracts.continuum.discretizer import Discretizer
 from nlsolve.contracts.continuum.law import ConstitutiveLaw
-from nlsolve.contracts.continuum.scene import Scene
 from nlsolve.contracts.linear_solver import LinearSolver
 from nlsolve.contracts.nonlinear_solver import NonlinearSolver
 from nlsolve.contracts.rules.globalization import Globalization
 from nlsolve.contracts.rules.predictor import Predictor
 from nlsolve.contracts.rules.refresh import RefreshRule
-from nlsolve.contracts.system import System
+from nlsolve.contracts.scene import Scene
 from nlsolve.registry import hookspecs
 
-CONTRACTS: dict[str, tuple[type[Component], ...]] = {
-    contracts[0].noun: contracts
-    for contracts in (
-        (Scene, System),
-        (ConstitutiveLaw,),
-        (Discretizer,),
-        (LinearSolver,),
-        (NonlinearSolver,),
-        (RefreshRule,),
-        (Predictor,),
-        (Globalization,),
+CONTRACTS: dict[str, type[Component]] = {
+    contract.noun: contract
+    for contract in (
+        Scene,
+        ConstitutiveLaw,
+        Discretizer,
+        LinearSolver,
+        NonlinearSolver,
+        RefreshRule,
+        Predictor,
+        Globalization,
     )
 }
-"""What a plugin may offer, by noun, in the order of a study file: a scene is a flow, or a system of equations."""
+"""What a plugin may offer, by noun, in the order of a study file."""
 
 
 @dataclass(frozen=True)
@@ -193,7 +191,7 @@ def load_registry() -> Registry:
 
 def _checked(cls: Any) -> type[Component]:
     """`cls`, a concrete component of a known noun with a literal kind; otherwise a TypeError in a sentence."""
-    contracts = tuple(itertools.chain(*CONTRACTS.values()))
+    contracts = tuple(CONTRACTS.values())
     if not (isinstance(cls, type) and issubclass(cls, Component) and issubclass(cls, contracts)):
         raise TypeError(f"{cls!r} is not a subclass of one of {', '.join(c.__name__ for c in contracts)}")
     if inspect.isabstract(cls):

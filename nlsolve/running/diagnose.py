@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-import hashlib
 from typing import Any
 
 import pandas as pd
 
 from nlsolve.contracts.status import SolveError
-from nlsolve.flow.setup import Setup
 from nlsolve.results.columns import DIAGNOSTICS
 from nlsolve.results.verdicts import names_settings
+from nlsolve.solving.ledger import Ledger
 from nlsolve.study.study import Study
 
-NO_CLOUD = "a system of equations has no cloud, and no operators on it"
+NO_CLOUD = "this scene has no cloud, and no operators on it"
 
 
 def telling(name: str) -> bool:
@@ -26,27 +25,19 @@ def diagnose(study: Study) -> pd.DataFrame:
 
     A cloud or discretizer that refuses leaves a row whose `operator` is the sentence.
     """
-    seen: set[str] = set()
+    seen: list[list[dict[str, Any]]] = []
     rows: list[dict[str, Any]] = []
     for case in study.cases:
-        setup = case.setup
         named = {name: case.parameters[name] for name in case.swept if telling(name)}
-        if not isinstance(setup, Setup):
-            key = setup.scene.model_dump_json()
-            rows += [{**named, "operator": NO_CLOUD}] if key not in seen else []
-            seen.add(key)
-            continue
         try:
-            cloud = setup.scene.cloud(setup.law)
-            key = hashlib.sha256(cloud.nodes.tobytes() + setup.discretizer.model_dump_json().encode()).hexdigest()
-            if key in seen:
-                continue
-            seen.add(key)
-            found = setup.discretizer.diagnostics(cloud) or [{"operator": "this discretizer gives no diagnostics"}]
+            simulation = case.parts.scene.simulation(case.parts, Ledger().entry)
+            found = simulation.diagnostics() or [{"operator": NO_CLOUD}]
         except SolveError as error:
             refused = {**named, "operator": error.detail}
             rows += [refused] if refused not in rows else []
-        else:
-            rows += [{**named, "nodes": len(cloud.nodes), **row} for row in found]
+            continue
+        if found not in seen:
+            seen.append(found)
+            rows += [{**named, **row} for row in found]
     swept = list(dict.fromkeys(name for case in study.cases for name in case.swept if telling(name)))
     return pd.DataFrame(rows, columns=[*swept, "nodes", *DIAGNOSTICS])

@@ -7,11 +7,8 @@ from typing import Any
 
 import pandas as pd
 
-from nlsolve.algebra.simulation import AlgebraicSetup
-from nlsolve.contracts.component import Component
-from nlsolve.contracts.status import SolveError
-from nlsolve.flow.setup import Setup
 from nlsolve.running.timing import calibrate
+from nlsolve.solving.ledger import Ledger
 from nlsolve.study.study import Study
 
 SOLVES = 20
@@ -40,43 +37,37 @@ SAMPLE = [
 ]
 
 
+METHOD = ("solver", "refresh", "predictor", "starter", "stop", "budget", "record")
+"""Sections that do not change what a unit of work costs."""
+
+
 def forecast(study: Study) -> pd.DataFrame:
     """A row a case: its swept parameters, its size, and the seconds it would take under the `ASSUMPTION`."""
-    measured: dict[str, dict[str, float]] = {}
+    measured: dict[str, dict[str, Any]] = {}
     rows = []
     for case in study.cases:
-        setup = case.setup
-        increments, clouds, stages = 1, 1, 0
-        parts: list[Component] = [setup.scene, setup.linear]
-        if isinstance(setup, Setup):
-            parts += [setup.law, setup.discretizer]
-            increments = max(1, setup.scene.increments)
-            clouds = 1 + (increments if setup.scene.motion_of_nodes != "fixed" else 0)
-            stages = len(setup.start.stages(setup.law))
-        key = "".join(part.model_dump_json() for part in parts)
+        key = case.parts.model_dump_json(exclude=set(METHOD))
         if key not in measured:
-            measured[key] = costs_of(setup)
-        costs = measured[key]
+            measured[key] = costs_of(case.parts)
+        costs, work = measured[key], case.parts.scene.simulation(case.parts, Ledger().entry).workload()
         seconds = {
-            "seconds_start": STAGE * stages * costs["seconds_iteration"],
-            "seconds": increments * costs["seconds_increment"],
+            "seconds_start": STAGE * work.stages * costs["seconds_iteration"],
+            "seconds": work.increments * costs["seconds_increment"],
         }
-        seconds["seconds_all"] = sum(seconds.values()) + clouds * costs["seconds_operators"]
+        seconds["seconds_all"] = sum(seconds.values()) + work.discretizations * costs["seconds_operators"]
         swept = {name: case.parameters[name] for name in case.swept}
-        rows.append({"case": case.id, **swept, "increments": increments, **costs, **seconds})
+        rows.append({"case": case.id, **swept, "increments": work.increments, **costs, **seconds})
     return pd.DataFrame(rows)
 
 
-def costs_of(setup: Setup | AlgebraicSetup) -> dict[str, Any]:
-    """Sizes and timings [s] of one scene at its first cloud, or of a system; all NaN when that is bad."""
-    try:
-        found = calibrate(setup, rounds=1)
-    except SolveError:
-        known = {"unknowns": len(setup.scene.start())} if isinstance(setup, AlgebraicSetup) else {}
-        return {**dict.fromkeys(SAMPLE, math.nan), **known}
+def costs_of(parts: Any) -> dict[str, Any]:
+    """Sizes and timings [s] of one case at its sample; NaN where that is bad."""
+    found = calibrate(parts, rounds=1)
+    sizes = {name: found.sizes.get(name) for name in ("nodes", "unknowns")}
+    if found.unit is None:
+        return {**dict.fromkeys(SAMPLE, math.nan), **{name: size for name, size in sizes.items() if size is not None}}
     return {
-        "nodes": found.nodes,
-        "unknowns": found.unknowns,
+        **sizes,
         "seconds_operators": found.operators,
         "seconds_factorization": found.unit.factorization,
         "seconds_triangular_solve": found.unit.triangular_solve,

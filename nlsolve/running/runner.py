@@ -1,4 +1,4 @@
-"""Study -> results: every case marched once, under one thread, and every ending a row."""
+"""Study -> results: every case run once, under one thread, and every ending a row."""
 
 from __future__ import annotations
 
@@ -12,11 +12,8 @@ from typing import Any
 import pandas as pd
 from threadpoolctl import threadpool_limits
 
-from nlsolve.algebra.simulation import solve_system
 from nlsolve.contracts.linear_solver import LinearSolver
 from nlsolve.contracts.status import SolveError, Status
-from nlsolve.flow.march import march
-from nlsolve.flow.setup import Progress, Record, Setup
 from nlsolve.registry.problems import StudyError, did_you_mean
 from nlsolve.results.costs.cost_prediction import UNITS, with_predictions
 from nlsolve.results.frames import Frames
@@ -27,6 +24,7 @@ from nlsolve.running.timing import CLOCKS, measure
 from nlsolve.show.figures import FigureError, draw, save
 from nlsolve.show.report import write_report
 from nlsolve.show.tables import Table, build
+from nlsolve.solving.simulate import Progress, Record, run_case
 from nlsolve.study.case import Case
 from nlsolve.study.study import Study
 from nlsolve.study.timing import Timing
@@ -131,16 +129,16 @@ def run(
 
 
 def execute(case: Case, number: int, cases: int, tell: Listener, timing: Timing) -> Part:
-    """March one case, or solve its system. Whatever it raises, an interruption excepted, becomes a row that says so."""
+    """Run one case. Whatever it raises, an interruption excepted, becomes a row that says so."""
     try:
         with threadpool_limits(limits=1):
-            clock, setup = CLOCKS[timing.clock], case.setup
+            clock = CLOCKS[timing.clock]
 
             def listen(progress: Progress) -> None:
                 tell(Event(case, number, cases, progress=progress))
 
-            record = march(setup, listen, clock) if isinstance(setup, Setup) else solve_system(setup, listen, clock)
-            units = unit_costs(record, setup.linear, clock) if timing.calibrate else {}
+            record = run_case(case.parts, listen, clock)
+            units = unit_costs(record, case.parts.linear, clock) if timing.calibrate else {}
     except Exception as error:  # the one boundary at which a crash turns into a result
         place = traceback.extract_tb(error.__traceback__)[-1]
         message = f"{type(error).__name__}: {error} ({place.filename}:{place.lineno})"

@@ -11,7 +11,7 @@ import operator
 import statistics
 import time
 from collections import defaultdict
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -19,13 +19,12 @@ import numpy as np
 import scipy.optimize
 from threadpoolctl import threadpool_limits
 
-from nlsolve.algebra.simulation import Algebraic, AlgebraicSetup
 from nlsolve.contracts.linear_solver import LinearSolver
 from nlsolve.contracts.problem import Expansion, NonlinearProblem
-from nlsolve.flow.setup import Setup
-from nlsolve.flow.state import sample
+from nlsolve.contracts.status import SolveError
 from nlsolve.results.costs.unit_costs import UnitCosts
 from nlsolve.series import Array
+from nlsolve.solving.ledger import Ledger
 
 ROUNDS = 5
 """How often all kinds of work are timed in turn."""
@@ -48,25 +47,26 @@ CLOCKS: dict[str, Callable[[], float]] = {"wall": time.perf_counter, "processor"
 
 @dataclass(frozen=True)
 class Calibration:
-    """What a case that has not been run costs: its size, seconds of its operators, and unit costs."""
-
-    nodes: int | None
-    unknowns: int
-    operators: float
-    unit: UnitCosts
-
-
-def calibrate(setup: Setup | AlgebraicSetup, rounds: int = ROUNDS) -> Calibration:
-    """On the cloud a case begins with (see `balance.sample`), or at the start of a system. Raises SolveError where the
-    cloud or the first tangent is bad.
+    """What a case that has not been run costs: its sizes (columns of `runs`), seconds of its operators, unit costs; the
+    last None where its discretisation or its first tangent is bad.
     """
+
+    sizes: Mapping[str, Any]
+    operators: float
+    unit: UnitCosts | None
+
+
+def calibrate(parts: Any, rounds: int = ROUNDS) -> Calibration:
+    """On the problem and the state that the simulation of a case gives as a sample."""
+    ledger = Ledger()
+    simulation = parts.scene.simulation(parts, ledger.entry)
     with threadpool_limits(limits=1):
-        if isinstance(setup, AlgebraicSetup):
-            system, start = Algebraic(setup.scene), setup.scene.start()
-            return Calibration(None, len(start), 0.0, measure(system, setup.linear, start, rounds))
-        problem, state, ledger = sample(setup)
-        unit = measure(problem, setup.linear, state, rounds)
-    return Calibration(len(problem.cloud.nodes), len(state), ledger.seconds["operators"], unit)
+        try:
+            problem, state = simulation.sample()
+            unit = measure(problem, parts.linear, state, rounds)
+        except SolveError:
+            unit = None
+    return Calibration(simulation.sizes, ledger.seconds["operators"], unit)
 
 
 @np.errstate(all="ignore")

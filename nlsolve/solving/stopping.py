@@ -60,6 +60,3 @@ class Budget(Component):
     noun: ClassVar[str] = "budget"
 
     iterations: int = Field(200, gt=0, description="iterations or series per increment")
-    pressures: int = Field(
-        60, gt=0, description="iterations of the pressure per increment, where a scene asks for them"
-    )

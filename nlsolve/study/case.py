@@ -5,45 +5,40 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields
-from typing import Annotated, Any
+from dataclasses import dataclass
+from typing import Any
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, create_model
+from pydantic import BaseModel, ConfigDict, ValidationError, create_model
 
-from nlsolve.algebra.simulation import AlgebraicSetup
 from nlsolve.contracts.component import Component
-from nlsolve.contracts.system import System
-from nlsolve.flow.continuation import LOAD, Start
-from nlsolve.flow.setup import Setup
+from nlsolve.contracts.linear_solver import LinearSolver
+from nlsolve.contracts.nonlinear_solver import NonlinearSolver
+from nlsolve.contracts.rules.refresh import RefreshRule
+from nlsolve.contracts.scene import Misfit, Scene, Section
 from nlsolve.registry.problems import ABSENT, Problem, problems_in
 from nlsolve.registry.registry import CONTRACTS, Registry
 from nlsolve.results.verdicts import names_settings
 from nlsolve.solving.stopping import Budget, StoppingTest
 from nlsolve.study.sweeps import Document, Point, leaves
 
-SECTIONS = tuple(part.name for part in fields(Setup))
-"""The parts of a study that a case is made of, and that can be swept."""
-
-DEFAULT_KINDS = {"linear": {"kind": "superlu"}, "starter": {"kind": "newton"}, "predictor": {"kind": "previous"}}
-"""Sections that may be left out, or written without a kind."""
-
-DEFAULTS_OF_KINDS = {"solver": "refresh", "discretizer": "counterpart"}
-"""Sections whose default the kind of another one names, as `default_refresh` and `default_counterpart`."""
-
-OF_A_SYSTEM = tuple(part.name for part in fields(AlgebraicSetup))
-"""Those of them that a scene without a flow has: F(u) = 0 knows no law, no discretizer, no way to a first state."""
-
-DEFAULT_KINDS_OF_A_SYSTEM = {"linear": {"kind": "superlu"}, "solver": {"kind": "robust"}}
-"""The same where the scene is a system of equations: it may be solved without a choice of the method."""
+COMMON: Mapping[str, Section] = {
+    "linear": Section(LinearSolver, {"kind": "superlu"}),
+    "solver": Section(NonlinearSolver),
+    "refresh": Section(RefreshRule, of="solver"),
+    "stop": Section(StoppingTest),
+    "budget": Section(Budget),
+}
+"""The sections of every case, beside `scene` and those that the scene's class declares."""
 
 DIGEST_LETTERS = 12
 
 
 @dataclass(frozen=True)
 class Case:
-    """One setup to be run.
+    """One case to be run.
 
     id : digest of the validated components.
+    parts : the validated component of each section, under its name.
     parameters : every parameter under its dotted name ("solver.order"); lists as JSON text. Before them, where a sweep
         has named settings, `variant` or what the sweep calls them: the names of this case's.
     swept : the names among them that the study sweeps and that differ between its cases; `variant` stands for all that
@@ -52,7 +47,7 @@ class Case:
     """
 
     id: str
-    setup: Setup | AlgebraicSetup
+    parts: Any
     parameters: Mapping[str, Any]
     swept: tuple[str, ...]
     reference: str = ""
@@ -77,64 +72,85 @@ class Composer:
 
     def __init__(self, registry: Registry) -> None:
         self.registry = registry
-        parts: dict[str, Any] = {noun: (registry.union(noun), ...) for noun in CONTRACTS if noun in SECTIONS} | {
-            "refresh": (registry.union("refresh"), None),  # absent only when there is no solver to ask for its default
-            "starter": (registry.union("solver"), ...),
-            "counterpart": (registry.union("discretizer"), None),
-            "stop": (StoppingTest, StoppingTest()),
-            "start": (Start, Start()),
-            "budget": (Budget, Budget()),
-            "record": (tuple[Annotated[float, Field(ge=0, allow_inf_nan=False)], ...], ()),
-        }
-        config = ConfigDict(extra="forbid", frozen=True)
-        self.model = create_model("Composition", __config__=config, **parts)
-        self.model_of_a_system = create_model(
-            "SystemComposition", __config__=config, **{name: parts[name] for name in OF_A_SYSTEM}
-        )
+        self._models: dict[type[Component], type[BaseModel]] = {}
+        self._all: dict[str, Section] = {}
+        for scene in registry.classes(Scene.noun).values():
+            if issubclass(scene, Scene):
+                self._all |= sections_of(scene)
+        self._all |= COMMON
+
+    @property
+    def sections(self) -> tuple[str, ...]:
+        """The parts of a study that cases are made of, and that can be swept: of all scenes that are installed."""
+        return (Scene.noun, *self._all)
 
     def case(self, document: Document, points: Sequence[Point]) -> Case:
         """The case of a document that the points of its sweeps have been assigned to. Raises Invalid."""
-        of_a_system = issubclass(self.named(document, "scene"), System)
-        composition = self.composition(document, of_a_system)
-        chosen = {name: getattr(composition, name) for name in (OF_A_SYSTEM if of_a_system else SECTIONS)}
-        setup = AlgebraicSetup(**chosen) if of_a_system else Setup(**chosen)
-        if setup.stop.kind == "claim" and not setup.solver.claims:
-            sentence = f"the solver {setup.solver.kind_name()!r} never claims a solution; use residual or difference"
+        parts: Any = self.parts(document)
+        if parts.stop.kind == "claim" and not parts.solver.claims:
+            sentence = f"the solver {parts.solver.kind_name()!r} never claims a solution; use residual or difference"
             raise Invalid([Problem(("stop", "kind"), "claim", sentence)])
-        if isinstance(setup, Setup):
-            _check_continuation(setup)
-        plain = json.loads(composition.model_dump_json())
+        try:
+            parts.scene.check(parts)
+        except Misfit as misfit:
+            value = getattr(getattr(parts, misfit.section), misfit.field)
+            raise Invalid([Problem((misfit.section, misfit.field), _plain(value), misfit.expected)]) from misfit
+        plain = json.loads(parts.model_dump_json())
         canonical = json.dumps(plain, sort_keys=True, separators=(",", ":"))
         digest = hashlib.sha256(canonical.encode()).hexdigest()[:DIGEST_LETTERS]
-        return Case(digest, setup, *_parameters(plain, points))
+        return Case(digest, parts, *_parameters(plain, points))
 
-    def composition(self, document: Document, of_a_system: bool) -> BaseModel:
-        """The validated sections, those left out at their defaults."""
-        sections, model = (OF_A_SYSTEM, self.model_of_a_system) if of_a_system else (SECTIONS, self.model)
-        needless = [name for name in document if name not in sections]
+    def parts(self, document: Document) -> BaseModel:
+        """The validated components of all sections, those left out at their defaults."""
+        scene = self.named(document, Scene.noun, Scene)
+        sections = sections_of(scene) if issubclass(scene, Scene) else self._all
+        needless = [name for name in document if name not in (Scene.noun, *sections)]
         if needless:
-            sentence = "a scene that is a system of equations has no such section: leave it out"
+            sentence = f"the scene {scene.kind_name()!r} has no such section: leave it out"
             raise Invalid([Problem((name,), ABSENT, sentence) for name in needless])
-        for section, default in (DEFAULT_KINDS_OF_A_SYSTEM if of_a_system else DEFAULT_KINDS).items():
-            _complete(document, section, default)
-        for noun, section in DEFAULTS_OF_KINDS.items():
-            if section not in sections:
-                continue
-            of_its_kind = getattr(self.named(document, noun), f"default_{section}", None)
-            if of_its_kind is not None:
-                _complete(document, section, of_its_kind)
+        for name, section in sections.items():
+            default = section.default
+            if section.of:
+                default = getattr(
+                    self.named(document, section.of, sections[section.of].contract), f"default_{name}", None
+                )
+            if default is not None:
+                _complete(document, name, default)
+        model = self.model(scene, sections)
         try:
             return model.model_validate(document)
         except ValidationError as error:
             raise Invalid(problems_in(error, model, document)) from error
 
-    def named(self, document: Document, section: str) -> type[Component]:
+    def model(self, scene: type[Component], sections: Mapping[str, Section]) -> type[BaseModel]:
+        """The pydantic model of the sections of one class of scenes."""
+        if scene not in self._models:
+            fields: dict[str, Any] = {Scene.noun: (self.registry.union(Scene.noun), ...)}
+            for name, section in sections.items():
+                if CONTRACTS.get(section.contract.noun) is section.contract:
+                    fields[name] = (self.registry.union(section.contract.noun), None if section.of else ...)
+                else:
+                    fields[name] = (section.contract, section.contract())
+            config = ConfigDict(extra="forbid", frozen=True)
+            self._models[scene] = create_model("Parts", __config__=config, **fields)
+        return self._models[scene]
+
+    def named(self, document: Document, section: str, contract: type[Component]) -> type[Component]:
         """The installed class that a section names, or is; Component itself where there is none."""
         given = document.get(section)
         if isinstance(given, Component):
             return type(given)
         kind = given.get("kind") if isinstance(given, dict) else None
-        return self.registry.classes(section).get(kind, Component) if isinstance(kind, str) else Component
+        return self.registry.classes(contract.noun).get(kind, Component) if isinstance(kind, str) else Component
+
+
+def sections_of(scene: type[Scene]) -> dict[str, Section]:
+    """The sections that a class of scenes declares, and those of every case that it does not declare otherwise."""
+    return {**scene.sections, **{name: scene.sections.get(name, section) for name, section in COMMON.items()}}
+
+
+def _plain(value: Any) -> Any:
+    return list(value) if isinstance(value, tuple) else value
 
 
 def _complete(document: Document, section: str, default: Mapping[str, Any]) -> None:
@@ -142,21 +158,6 @@ def _complete(document: Document, section: str, default: Mapping[str, Any]) -> N
     given = document.get(section, {})
     if isinstance(given, dict) and "kind" not in given:
         document[section] = {**default, **given}
-
-
-def _check_continuation(setup: Setup) -> None:
-    """Refuse a way to the first state that the law cannot go."""
-    try:
-        setup.start.stages(setup.law)
-    except ValidationError as error:
-        reasons = "; ".join(detail["msg"] for detail in error.errors())
-        raise Invalid(
-            [Problem(("start", "values"), list(setup.start.values), f"refused by the law: {reasons}")]
-        ) from error
-    except ValueError as error:
-        field = "values" if setup.start.by == LOAD else "by"
-        reason = str(error).partition(": ")[2]
-        raise Invalid([Problem(("start", field), getattr(setup.start, field), reason)]) from error
 
 
 def _parameters(plain: Mapping[str, Any], points: Sequence[Point]) -> tuple[dict[str, Any], tuple[str, ...]]:

@@ -20,7 +20,7 @@ from nlsolve.results.reference_error import REFERENCE
 from nlsolve.results.verdicts import VARIANT, names_settings
 from nlsolve.show.figures import FigureSpec
 from nlsolve.show.tables import TableSpec, check
-from nlsolve.study.case import SECTIONS, Case, Composer, Invalid
+from nlsolve.study.case import Case, Composer, Invalid
 from nlsolve.study.sweeps import Document, Point, Setting, Sweep, assign_all, leaves, merged, places_of, swept_places
 from nlsolve.study.timing import Timing
 
@@ -143,9 +143,9 @@ class _Builder:
             raise StudyError(*dict.fromkeys(sentences))
 
     def frame(self) -> Frame:
-        document = {name: value for name, value in self.document.items() if name not in SECTIONS}
+        document = {name: value for name, value in self.document.items() if name not in self.composer.sections}
         unknown = [name for name in document if name not in Frame.model_fields]
-        names = [*Frame.model_fields, *SECTIONS]
+        names = [*Frame.model_fields, *self.composer.sections]
         self.refuse(
             [Problem((name,), self.document[name], f"no such section; {did_you_mean(name, names)}") for name in unknown]
         )
@@ -158,9 +158,9 @@ class _Builder:
         self.refuse(
             [Problem((name,), [], "swept twice") for name in swept if swept.count(name) > 1]
             + [
-                Problem((name,), [], f"not a parameter; {did_you_mean(name.split('.')[0], SECTIONS)}")
+                Problem((name,), [], f"not a parameter; {did_you_mean(name.split('.')[0], self.composer.sections)}")
                 for name in swept
-                if name.split(".")[0] not in SECTIONS
+                if name.split(".")[0] not in self.composer.sections
             ]
         )
         return frame
@@ -170,8 +170,10 @@ class _Builder:
         references: dict[str, Case] = {}
         sentences: list[str] = []
         named = {name for sweep in frame.sweep if sweep.each is not None for name in sweep.columns}
-        base = {name: value for name, value in self.document.items() if name in SECTIONS}
-        by_hand = {name: value for name, value in self.overrides.items() if name.split(".")[0] in SECTIONS}
+        base = {name: value for name, value in self.document.items() if name in self.composer.sections}
+        by_hand = {
+            name: value for name, value in self.overrides.items() if name.split(".")[0] in self.composer.sections
+        }
         root: Place = ("quick", "sweep") if self.quick and "sweep" in self.document["quick"] else ("sweep",)
         for points in itertools.product(*(sweep.points((*root, number)) for number, sweep in enumerate(frame.sweep))):
             try:

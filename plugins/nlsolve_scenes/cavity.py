@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from collections.abc import Mapping
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 from pydantic import Field
 
-from nlsolve.plugin import Cloud, ConstitutiveLaw
+from nlsolve.plugin import Cloud, ConstitutiveLaw, FlowScene, Misfit, Physics, Section
 from nlsolve_scenes.nodes.rectangle import Rectangle
 
 
@@ -17,9 +18,9 @@ class Cavity(Rectangle):
     plain :   U = lid_speed, which jumps to zero in the corners (Ghia, Ghia & Shin 1982).
     smooth :  U = 16 ξ² (1 − ξ)² lid_speed, ξ = x/L: no singularity in the corners (Bourcier & François 1969).
 
-    Nothing flows in or out, so the flow needs a penalty, best with an iterated pressure (`divergence`). Nodes are
-    scattered, for a regular grid carries a pressure that alternates from cell to cell and is stirred up by the corners.
-    With `convection` the Reynolds number is set by the density, Re = ρ lid_speed L/μ; see `reynolds`.
+    Nothing flows in or out, so the flow needs a penalty, best with an iterated pressure (`divergence_tolerance`).
+    Nodes are scattered, for a regular grid carries a pressure that alternates from cell to cell and is stirred up by
+    the corners. With convection the Reynolds number is set by the density, Re = ρ lid_speed L/μ; see `reynolds`.
     """
 
     kind: Literal["cavity"] = "cavity"
@@ -27,10 +28,16 @@ class Cavity(Rectangle):
     lid_speed: float = Field(1.0, gt=0, description="speed of the lid, at its middle [mm/s]")
     lid: Literal["plain", "smooth"] = Field("plain", description="profile of the lid's speed")
     nodes: Literal["grid", "scattered"] = Field("scattered", description="on grid lines, or scattered by repulsion")
-    penalty: float | None = Field(1000.0, gt=0, description="λ, in the unit of penalty_unit")
-    divergence: float | None = Field(
-        1e-6, gt=0, description="‖div V‖/‖ε̄‖ to be reached by iterating the pressure; absent: penalty alone"
-    )
+    sections: ClassVar[Mapping[str, Section]] = {
+        **FlowScene.sections,
+        "physics": Section(Physics, {"penalty": 1000.0, "divergence_tolerance": 1e-6}),
+    }
+
+    def check(self, parts: Any) -> None:
+        """A pressure is needed."""
+        super().check(parts)
+        if not parts.physics.penalty:
+            raise Misfit("physics", "penalty", "nothing flows in or out of a cavity, so its flow needs a penalty")
 
     @property
     def corners(self) -> tuple[tuple[float, float], tuple[float, float]]:
@@ -42,10 +49,10 @@ class Cavity(Rectangle):
         """Lid speed over side."""
         return self.lid_speed / self.side
 
-    def reynolds(self, law: ConstitutiveLaw) -> float:
+    def reynolds(self, law: ConstitutiveLaw, density: float) -> float:
         """ρ lid_speed L/μ, with μ at the reference rate."""
         viscosity = float(law.viscosity(np.array([self.reference_rate**2]))[0])
-        return self.density * self.lid_speed * self.side / viscosity
+        return density * self.lid_speed * self.side / viscosity
 
     def boundary_velocity(self, cloud: Cloud, law: ConstitutiveLaw, time: float) -> np.ndarray:
         """The lid's profile on "top", its two corners held like all other walls."""

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from typing import Literal, Self
+from typing import ClassVar, Literal
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import Field
 
-from nlsolve.plugin import Cloud, ConstitutiveLaw, Exact, Scene
+from nlsolve.plugin import Cloud, ConstitutiveLaw, Exact, FlowScene, Physics
 from nlsolve_scenes.nodes.files import NodeFile
 from nlsolve_scenes.nodes.scatter import jittered, scatter
 
 
-class Channel(Scene):
+class Channel(FlowScene):
     """|y| ≤ H, 0 ≤ x ≤ L, driven by a uniform force f = (G, 0); walls held, exact velocity imposed at both ends.
 
     u(y) = n/(n + 1) (G/m)^(1/n) (H^((n+1)/n) − |y|^((n+1)/n)),  τ = −G y, for the pure power law τ = m γ̇ⁿ.
@@ -29,11 +29,7 @@ class Channel(Scene):
     jitter: float = Field(0.0, ge=0, lt=0.5, description="random shift of inner nodes, part of the nearest distance")
     seed: int = Field(0, ge=0, description="of everything random in the nodes")
 
-    @model_validator(mode="after")
-    def _steady_on_fixed_nodes(self) -> Self:
-        if self.motion_of_nodes == "lagrangian":
-            raise ValueError('motion_of_nodes = "lagrangian": material leaves the channel, so its nodes stay "fixed"')
-        return self
+    keeps_nodes: ClassVar[str | None] = "material leaves the channel"
 
     @property
     def reference_rate(self) -> float:
@@ -57,7 +53,7 @@ class Channel(Scene):
         velocity, _ = self._profile(law, cloud.nodes[cloud.boundary])
         return velocity
 
-    def body_force(self, points: np.ndarray, law: ConstitutiveLaw) -> np.ndarray:
+    def body_force(self, points: np.ndarray, law: ConstitutiveLaw, physics: Physics) -> np.ndarray:
         """(G, 0) [N/mm³], with G = m ((2n + 1)/n · mean speed/H)ⁿ / H."""
         _, gradient = self._profile(law, points)
         return np.tile([gradient, 0.0], (len(points), 1))

@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal, Self
+from typing import ClassVar, Literal, Self
 
 import numpy as np
 from pydantic import Field, model_validator
 
-from nlsolve.plugin import Cloud, ConstitutiveLaw, Exact, Scene
+from nlsolve.plugin import Cloud, ConstitutiveLaw, Exact, FlowScene, NodeMotion
 from nlsolve_scenes.nodes.grading import lines, relative_spacing
 from nlsolve_scenes.nodes.scatter import jittered
 
 LEAST_ECCENTRICITY = 1e-2  # of the mean gap: the closed form loses as many digits as the poles are far away
 
 
-class EccentricCylinders(Scene):
+class EccentricCylinders(FlowScene):
     """|z| ≥ r_i and |z − e| ≤ r_o, z = x + i y: V = ω_i × z on the inner wall, ω_o × (z − e) on the outer one.
 
     For a Newtonian law the quasi-static incompressible flow is known in closed form, with the torque and the force of
@@ -33,6 +33,7 @@ class EccentricCylinders(Scene):
     grading: float = Field(0.7, gt=0, le=1, description="distance of circles at the walls over that in the middle")
     jitter: float = Field(0.0, ge=0, lt=0.5, description="random shift of interior nodes, part of the nearest distance")
     seed: int = Field(0, ge=0, description="of the random shifts")
+    keeps_nodes: ClassVar[str | None] = "nodes carried around the bearing crowd in its gap"
 
     @model_validator(mode="after")
     def _one_inside_the_other(self) -> Self:
@@ -49,10 +50,6 @@ class EccentricCylinders(Scene):
             )
         if self.inner_spin == self.outer_spin == 0.0:
             raise ValueError("inner_spin = outer_spin = 0: nothing moves; let one of them spin")
-        if self.motion_of_nodes == "lagrangian":
-            raise ValueError(
-                'motion_of_nodes = "lagrangian": nodes carried around the bearing crowd in its gap; keep them "fixed"'
-            )
         return self
 
     @property
@@ -106,7 +103,7 @@ class EccentricCylinders(Scene):
         quantities = {"torque": viscosity * bearing.torque, "force_x": 0.0, "force_y": viscosity * bearing.force}
         return Exact(np.stack([velocity.real, velocity.imag], axis=1), quantities)
 
-    def contour(self) -> np.ndarray:
+    def contour(self, motion: NodeMotion) -> np.ndarray:
         """The bipolar circle half-way between the walls."""
         poles = self._poles
         level = 0.5 * (poles.level(self.inner_radius) + poles.level(self.outer_radius + self.eccentricity))

@@ -7,7 +7,7 @@ from typing import Literal, Self
 import numpy as np
 from pydantic import Field, model_validator
 
-from nlsolve.plugin import Cloud, ConstitutiveLaw, Exact, Series, SolveError, Status, stress
+from nlsolve.plugin import Cloud, ConstitutiveLaw, Exact, Physics, Series, SolveError, Status, stress
 from nlsolve_scenes.formulas import Formula, Jet
 from nlsolve_scenes.nodes.rectangle import Rectangle, grid
 
@@ -20,8 +20,8 @@ class Manufactured(Rectangle):
 
     Formulas are texts in x and y [mm] that give mm/s and MPa. V must be free of divergence, so that the volumetric
     term of a penalty vanishes for it. ∇p is part of f with a penalty only, since nothing carries a pressure without
-    one; a penalty λ alone leaves an error of the order p/λ, an iterated pressure (`divergence`) none. All derivatives
-    are exact: formulas and law are run on truncated series. Method: Roache (2002).
+    one; a penalty λ alone leaves an error of the order p/λ, an iterated pressure (`divergence_tolerance`) none. All
+    derivatives are exact: formulas and law are run on truncated series. Method: Roache (2002).
     """
 
     kind: Literal["manufactured"] = "manufactured"
@@ -85,7 +85,7 @@ class Manufactured(Rectangle):
         """The given field, whatever the law."""
         return Exact(self._velocity(points))
 
-    def body_force(self, points: np.ndarray, law: ConstitutiveLaw) -> np.ndarray:
+    def body_force(self, points: np.ndarray, law: ConstitutiveLaw, physics: Physics) -> np.ndarray:
         """f above [N/mm³]. Raises SolveError (non finite) where the law has no finite viscosity, as at ε̄ = ε₀ = 0."""
         u, v = Jet.of(self.u, points), Jet.of(self.v, points)
         rate = _strain_rate(u, v)
@@ -93,11 +93,11 @@ class Manufactured(Rectangle):
             xx, _, xy = _slope_of_stress(law, rate, np.stack([u.xx, v.xy, 0.5 * (u.xy + v.xx)]))
             _, yy, yx = _slope_of_stress(law, rate, np.stack([u.xy, v.yy, 0.5 * (u.yy + v.xy)]))
         force = -np.stack([xx + yx, xy + yy], axis=1)
-        if self.penalty:
+        if physics.penalty:
             p = Jet.of(self.p, points)
             force += np.stack([p.x, p.y], axis=1)
-        if self.convection:
-            force += self.density * np.stack([u.f * u.x + v.f * u.y, u.f * v.x + v.f * v.y], axis=1)
+        if physics.convection:
+            force += physics.density * np.stack([u.f * u.x + v.f * u.y, u.f * v.x + v.f * v.y], axis=1)
         bad = np.flatnonzero(~np.isfinite(force).all(axis=1))
         if len(bad):
             x, y = points[bad[0]]

@@ -7,7 +7,7 @@ from typing import Annotated, Literal, Self
 import numpy as np
 from pydantic import Field, model_validator
 
-from nlsolve.plugin import Cloud, ConstitutiveLaw, Exact, Scene, SolveError, Status, local_index
+from nlsolve.plugin import Cloud, ConstitutiveLaw, Exact, FlowScene, NodeMotion, SolveError, Status, local_index
 from nlsolve_scenes.nodes.files import NodeFile
 from nlsolve_scenes.nodes.rings import Auto, GradedRings, Rings, Scattered
 
@@ -16,7 +16,7 @@ ON_CIRCLE = 1e-3  # largest distance of a wall's node of a file from its circle,
 THINNEST = 1e-3  # least local index from which a layer is taken; a perfectly plastic law has none
 
 
-class StirringTool(Scene):
+class StirringTool(FlowScene):
     """r_t ≤ r ≤ r_p, plane strain; the tool's wall moves, the outer wall is held, adhesion is perfect.
 
     spin : V = ω r_t (−sin θ, cos θ) on the tool. Quasi-static exact solution for the pure power law (incompressible):
@@ -120,9 +120,9 @@ class StirringTool(Scene):
         torque = 2.0 * np.pi * inner**2 * form.shear_consistency * shear_rate**form.index
         return Exact(velocity, {"torque": torque})
 
-    def contour(self) -> np.ndarray | None:
+    def contour(self, motion: NodeMotion) -> np.ndarray | None:
         """The circle of radius √(r_t r_p) about the centre of the annulus; none once the tool has left that centre."""
-        if self.motion == "orbit" and self.motion_of_nodes == "lagrangian":
+        if self.motion == "orbit" and motion.moving:
             return None
         angle = 2.0 * np.pi * np.arange(720) / 720
         return np.sqrt(self.tool_radius * self.plate_radius) * np.stack([np.cos(angle), np.sin(angle)], axis=1)

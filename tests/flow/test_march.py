@@ -10,6 +10,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from cases import setup
+from nlsolve.flow.setup import Progress, Record
 from nlsolve_discretizers import LinearTriangles, MovingLeastSquares
 from nlsolve_laws import PowerLaw
 from nlsolve_rules import Cubic, Energy, FullSteps, NonMonotone
@@ -25,7 +26,6 @@ from pydantic import ValidationError
 from nlsolve import SolveError, Status
 from nlsolve.flow.continuation import Start
 from nlsolve.flow.march import march
-from nlsolve.flow.setup import Progress, Record
 from nlsolve.plugin import Cloud, Operators, Step
 from nlsolve.results.columns import FIELDS, RUNS, STEPS
 from nlsolve.solving.stopping import Budget, StoppingTest

@@ -13,6 +13,7 @@ from fakes import STUDY, registry_of, write_study
 from hypothesis import given
 from hypothesis import strategies as st
 from matplotlib.figure import Figure
+from nlsolve.flow.setup import Record
 from nlsolve_rules.refresh import EveryIteration, PoorContraction
 from nlsolve_scenes import StirringTool
 from nlsolve_scenes.nodes.rings import Rings
@@ -24,7 +25,6 @@ from pydantic import TypeAdapter, ValidationError
 import nlsolve
 from nlsolve import SolveError, Status
 from nlsolve.flow.march import march
-from nlsolve.flow.setup import Record
 from nlsolve.flow.state import sample
 from nlsolve.plugin import Factors, LinearSolver, NonlinearProblem
 from nlsolve.registry.problems import StudyError

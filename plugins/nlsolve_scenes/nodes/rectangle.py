@@ -4,20 +4,20 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from dataclasses import replace
-from typing import Literal, Self
+from typing import ClassVar, Literal
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import Field
 
-from nlsolve.plugin import Cloud, ConstitutiveLaw, Scene
+from nlsolve.plugin import Cloud, ConstitutiveLaw, FlowScene
 from nlsolve_scenes.nodes.grading import lines, relative_spacing
 from nlsolve_scenes.nodes.scatter import jittered, scatter
 
 FIRST_ON_DIAGONAL = 0.75  # place of the inner node next to a corner, in distances of the walls' nodes
 
 
-class Rectangle(Scene):
-    """A scene in x₀ ≤ x ≤ x₀ + width, y₀ ≤ y ≤ y₀ + height, whose nodes stay where they are."""
+class Rectangle(FlowScene):
+    """A flow in x₀ ≤ x ≤ x₀ + width, y₀ ≤ y ≤ y₀ + height, whose nodes stay where they are."""
 
     spacing: float = Field(0.05, gt=0, description="mean distance of nodes [mm]")
     grading: float = Field(
@@ -30,13 +30,7 @@ class Rectangle(Scene):
     jitter: float = Field(0.0, ge=0, lt=0.5, description="random shift of interior nodes, part of the nearest distance")
     seed: int = Field(0, ge=0, description="of scattered nodes and of the random shifts")
 
-    @model_validator(mode="after")
-    def _on_fixed_nodes(self) -> Self:
-        if self.motion_of_nodes == "lagrangian":
-            raise ValueError(
-                'motion_of_nodes = "lagrangian": boundary nodes would leave the rectangle, so its nodes stay "fixed"'
-            )
-        return self
+    keeps_nodes: ClassVar[str | None] = "boundary nodes would leave the rectangle"
 
     @property
     @abstractmethod

@@ -8,16 +8,19 @@ formula is written for either.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Mapping
 from typing import Any, ClassVar
 
 import numpy as np
 from pydantic import Field
 
-from nlsolve.contracts.component import Component
+from nlsolve.algebra.root_search import Algebraic, RootSearch
+from nlsolve.contracts.nonlinear_solver import NonlinearSolver
+from nlsolve.contracts.scene import Entry, Scene, Section
 from nlsolve.series import Array
 
 
-class System(Component, ABC):
+class System(Scene, ABC):
     """A formula and the state from which its root is sought; roots and a sparsity pattern where they are known.
 
     class Circle(System):
@@ -31,7 +34,7 @@ class System(Component, ABC):
             return np.array([1.0, 0.5])
     """
 
-    noun: ClassVar[str] = "scene"
+    sections: ClassVar[Mapping[str, Section]] = {"solver": Section(NonlinearSolver, {"kind": "robust"})}
 
     factor: float = Field(
         1.0, gt=0, description="the standard start times this; a start of zeros becomes one of factors (1: as it is)"
@@ -79,3 +82,12 @@ class System(Component, ABC):
         """The known root, shape (U,), that is nearest to u; None where none is known."""
         roots = self.roots()
         return None if roots is None else roots[np.linalg.norm(roots - u, axis=1).argmin()]
+
+    def equations(self) -> Algebraic:
+        """F with its Jacobian and its expansion."""
+        return Algebraic(self.formula, len(self.standard_start()), self.pattern(), self.is_gradient)
+
+    def simulation(self, parts: Any, entry: Entry) -> RootSearch:
+        with entry("operators"):
+            problem = self.equations()
+        return RootSearch(problem, self.start(), parts.linear, self.nearest_root, self.singular)

@@ -1,0 +1,138 @@
+"""F(u) = 0 from its start to a root: the simulation of a system, and whether a root is where it ended."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Generator, Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from nlsolve.algebra.colouring import Compression
+from nlsolve.contracts.linear_solver import LinearSolver
+from nlsolve.contracts.outcome import Outcome
+from nlsolve.contracts.problem import Expansion, NonlinearProblem
+from nlsolve.contracts.scene import Simulation, Solve
+from nlsolve.contracts.status import SolveError, Status
+from nlsolve.series import Array, Series
+
+NEAR = 0.01  # of the size of a root: a state is at the root nearer than this
+POLISHING = 10  # Newton steps that must not lead further away than that from a root nobody has listed
+DENSE = 300  # unknowns up to which these steps are least squares of least norm, which a singular Jacobian allows
+
+
+class Algebraic(NonlinearProblem):
+    """F(u) = 0; the Jacobian is coefficient 1 of the formula run on u with the seeds of all groups of columns beside
+    one another.
+
+    Its scale is 1: the published sets are judged by an absolute residual (‖F‖∞ < 1e-6 for the 23 problems), and F alone
+    does not tell the size of what cancels in it. `stop.tolerance` therefore is a bound on ‖F‖₂ itself.
+    """
+
+    def __init__(
+        self, formula: Callable[[Any], Any], unknowns: int, pattern: Any | None = None, is_gradient: bool = False
+    ) -> None:
+        self.is_gradient = is_gradient
+        self._formula = formula
+        self._compression = Compression(pattern, unknowns)
+
+    def residual(self, u: Array) -> Array:
+        """F(u)."""
+        return self._formula(u)
+
+    def jacobian(self, u: Array) -> Any:
+        """J(u), sparse (U, U)."""
+        seeds = self._compression.seeds
+        path = Series(np.broadcast_to(u[:, None], seeds.shape))
+        path.append(seeds)
+        return self._compression.unpack(self._formula(path).coefficient(1))
+
+    def expand(self, u: Array) -> Expansion:
+        """The same formula, run on a series that begins with u."""
+        path = Series(u)
+        return Expansion(path, self._formula(path))
+
+
+class RootSearch(Simulation):
+    """F(u) = 0 from one start, the root found held against the nearest of the known ones.
+
+    nearest_root : u -> the nearest known root, (U,); None where none is known.
+    singular : whether the Jacobian is singular at a known root.
+
+    A stopping test met away from all of them is a root that nobody listed, or a doubt, see `verified`.
+    """
+
+    def __init__(
+        self,
+        problem: NonlinearProblem,
+        start: Array,
+        linear: LinearSolver,
+        nearest_root: Callable[[Array], Array | None],
+        singular: bool = False,
+    ) -> None:
+        self.problem, self.start, self.linear = problem, start, linear
+        self.nearest_root, self.singular = nearest_root, singular
+        self.doubt = ""
+        self.sizes = {"unknowns": len(start)}
+
+    def solves(self) -> Generator[Solve, Outcome, Outcome]:
+        outcome = yield Solve(self.problem, self.start)
+        error = root_error(self.nearest_root(outcome.state), outcome.state)
+        if outcome.status is Status.CONVERGED and not error <= NEAR:
+            outcome, self.doubt = verified(self.problem, outcome, self.linear, known=not np.isnan(error))
+        return outcome
+
+    def sample(self) -> tuple[NonlinearProblem, Array]:
+        return self.problem, self.start
+
+    def measured(self, outcome: Outcome) -> Mapping[str, Any]:
+        return {
+            "root_error": root_error(self.nearest_root(outcome.state), outcome.state),
+            "root_singular": self.singular,
+            "doubt": self.doubt,
+        }
+
+
+def root_error(root: Array | None, u: Array) -> float:
+    """‖u − root‖/‖root‖, ‖u‖ for the root 0; NaN where none is known."""
+    return np.nan if root is None else float(np.linalg.norm(u - root)) / _size(root)
+
+
+def verified(problem: NonlinearProblem, outcome: Outcome, linear: LinearSolver, known: bool) -> tuple[Outcome, str]:
+    """The outcome of a state at which the stopping test is met away from all known roots, and what is in doubt of it.
+
+    Another root when Newton's steps stay; elsewhere F may be small without a zero, as it is far out on exp(−x).
+    """
+    moved = displacement(problem, outcome.state, linear)
+    if moved <= NEAR:
+        found = Status.OTHER_ROOT
+        return (replace(outcome, status=found, detail=found.sentence) if known else outcome), ""
+    return outcome, (
+        f"no root is near: {POLISHING} Newton steps lead {100 * moved:.3g} % away from where ‖F‖ is "
+        f"{outcome.residual_norm:.1e}; tighten stop.tolerance"
+    )
+
+
+def displacement(problem: NonlinearProblem, u: Array, linear: LinearSolver) -> float:
+    """‖u_10 − u‖/‖u‖ for ten Newton steps from u, off the clock; infinite when a step fails."""
+    state = u
+    for _ in range(POLISHING):
+        residual, jacobian = problem.residual(state), problem.jacobian(state)
+        if not (np.isfinite(residual).all() and np.isfinite(jacobian.data).all()):
+            return np.inf
+        if len(u) <= DENSE:
+            step = np.linalg.lstsq(jacobian.toarray(), -residual, rcond=None)[0]
+        else:
+            try:
+                step = linear.factorize(jacobian).solve(-residual)
+            except SolveError:
+                return np.inf
+        state = state + step
+        if np.linalg.norm(step) <= np.finfo(float).eps * np.linalg.norm(state):
+            break
+    moved = float(np.linalg.norm(state - u)) / _size(u)
+    return moved if np.isfinite(moved) else np.inf
+
+
+def _size(u: Array) -> float:
+    return float(np.linalg.norm(u)) or 1.0

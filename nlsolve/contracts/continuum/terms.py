@@ -1,0 +1,126 @@
+"""Which terms the balance of momentum has, how time passes, how nodes move, and what is recorded: sections of a flow.
+
+    ρ (∂V/∂t + (V·∇) V) = div σ + f,     σ = (λ tr(ε̇) − p) I + S(ε̇)
+
+Inertia, convection, the penalty λ, the iterated pressure p and the motion of nodes are present only when a study
+switches them on.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, ClassVar, Literal, Self
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from nlsolve.contracts.component import Component
+from nlsolve.contracts.continuum.law import ConstitutiveLaw
+from nlsolve.series import Array
+
+
+class Physics(Component):
+    """The terms of the balance of momentum beside div S, and how incompressible the material is."""
+
+    noun: ClassVar[str] = "physics"
+
+    density: float = Field(2.81e-9, gt=0, description="mass density [t/mm³]")
+    inertia: bool = Field(False, description="keep the term ρ (V − V_k)/Δt")
+    convection: bool = Field(False, description="keep the term ρ (V·∇) V; for fixed nodes only")
+    penalty: float | None = Field(None, ge=0, description="λ, in the unit of penalty_unit; absent: no volumetric term")
+    penalty_unit: Literal["reference", "local", "absolute"] = Field(
+        "reference",
+        description="λ is a multiple of μ at the reference strain rate, of μ where it acts, or given in MPa s",
+    )
+    divergence_tolerance: float | None = Field(
+        None,
+        gt=0,
+        description="‖div V‖/‖ε̄‖ to be reached by iterating the pressure (augmented Lagrangian); absent: penalty alone",
+    )
+    pressure_iterations: int = Field(
+        60, gt=0, description="iterations of the pressure per increment, where a divergence_tolerance asks for them"
+    )
+
+    @model_validator(mode="after")
+    def _a_pressure_needs_a_penalty(self) -> Self:
+        if self.divergence_tolerance is not None and not self.penalty:
+            raise ValueError(
+                f"divergence_tolerance = {self.divergence_tolerance:g}: the pressure is iterated with a penalty; "
+                "set penalty > 0"
+            )
+        return self
+
+    def penalty_modulus(self, law: ConstitutiveLaw, reference_rate: float, rate_squared: Array) -> float | Array:
+        """λ [MPa s]: penalty · μ at the reference rate [1/s], or penalty · μ(ε̄²) with the `rate_squared` (L,) of the
+        volume points, or the penalty itself; 0 without a penalty.
+        """
+        if not self.penalty:
+            return 0.0
+        if self.penalty_unit == "absolute":
+            return self.penalty
+        if self.penalty_unit == "local":
+            return self.penalty * law.viscosity(rate_squared)
+        return self.penalty * float(law.viscosity(np.array([reference_rate**2]))[0])
+
+
+class TimeSteps(Component):
+    """A march by implicit Euler from the first state at t = 0 to `horizon`, or one steady state."""
+
+    noun: ClassVar[str] = "time"
+
+    horizon: float | None = Field(None, gt=0, description="end of the march [s]; absent: one steady state")
+    increment: float = Field(1e-4, gt=0, description="Δt, time step of the march [s]")
+
+    @property
+    def increments(self) -> int:
+        """Number of time steps; 0 for a steady state."""
+        return 0 if self.horizon is None else max(1, round(self.horizon / self.increment))
+
+
+class NodeMotion(Component):
+    """Whether nodes stay or move with the material, and how the material is followed."""
+
+    noun: ClassVar[str] = "motion"
+
+    nodes: Literal["fixed", "lagrangian"] = Field("fixed", description="nodes stay, or move with the material")
+    markers: bool = Field(False, description="carry material markers, from each node at t = 0; shifted nodes always do")
+    shifting: float = Field(
+        0.0, ge=0, le=1, description="moving nodes: part of the overlap by which near ones part in an increment"
+    )
+    skin: float = Field(
+        0.0,
+        ge=0,
+        le=1,
+        description="moving nodes: neighbours and triangles are kept until the distance of two near nodes has changed "
+        "by this part of the nearest one's; 0: found anew in each increment",
+    )
+
+    @model_validator(mode="after")
+    def _fits_together(self) -> Self:
+        if self.markers and self.moving and not self.shifting:
+            raise ValueError(
+                'markers = true: nodes that move are the markers themselves; use nodes = "fixed" or shifting'
+            )
+        if self.shifting and not self.moving:
+            raise ValueError(f'shifting = {self.shifting:g}: fixed nodes are not shifted; use nodes = "lagrangian"')
+        if self.skin and not self.moving:
+            raise ValueError(
+                f"skin = {self.skin:g}: the neighbours of fixed nodes never change; "
+                'use nodes = "lagrangian" or leave it out'
+            )
+        return self
+
+    @property
+    def moving(self) -> bool:
+        """Whether nodes move with the material."""
+        return self.nodes == "lagrangian"
+
+
+class Recording(Component):
+    """What is recorded of a flow beside its last state."""
+
+    noun: ClassVar[str] = "record"
+
+    times: tuple[Annotated[float, Field(ge=0)], ...] = Field(
+        (), description="times at which the fields are recorded, besides the last [s]"
+    )
+    probe: tuple[float, float] | None = Field(None, description="place whose nearest node is recorded in time [mm]")

@@ -1,0 +1,60 @@
+"""Scenes that are flows: geometry and boundary, and the sections that a flow asks a study for."""
+
+from __future__ import annotations
+
+from abc import ABC
+from collections.abc import Mapping
+from typing import Any, ClassVar
+
+from pydantic import ValidationError
+
+from nlsolve.contracts.continuum.discretizer import Discretizer
+from nlsolve.contracts.continuum.geometry import Geometry
+from nlsolve.contracts.continuum.law import ConstitutiveLaw
+from nlsolve.contracts.continuum.terms import NodeMotion, Physics, Recording, TimeSteps
+from nlsolve.contracts.nonlinear_solver import NonlinearSolver
+from nlsolve.contracts.rules.predictor import Predictor
+from nlsolve.contracts.scene import Entry, Misfit, Scene, Section
+from nlsolve.flow.continuation import LOAD, Start
+from nlsolve.flow.march import FlowSimulation
+from nlsolve.flow.state import FlowParts
+
+
+class FlowScene(Geometry, Scene, ABC):
+    """A flow of one material: R(v) = 0 at a moment, or implicit Euler from a first state at t = 0 to a horizon."""
+
+    sections: ClassVar[Mapping[str, Section]] = {
+        "law": Section(ConstitutiveLaw),
+        "physics": Section(Physics),
+        "time": Section(TimeSteps),
+        "motion": Section(NodeMotion),
+        "discretizer": Section(Discretizer),
+        "counterpart": Section(Discretizer, of="discretizer"),
+        "start": Section(Start),
+        "starter": Section(NonlinearSolver, {"kind": "newton"}),
+        "predictor": Section(Predictor),
+        "record": Section(Recording),
+    }
+
+    def simulation(self, parts: FlowParts, entry: Entry) -> FlowSimulation:
+        return FlowSimulation(parts, entry)
+
+    def check(self, parts: Any) -> None:
+        """Nodes move where they may, material is carried once, and the law can go the way to the first state."""
+        if parts.motion.moving and self.keeps_nodes:
+            raise Misfit("motion", "nodes", f'{self.keeps_nodes}; use nodes = "fixed"')
+        if parts.motion.moving and parts.physics.convection:
+            raise Misfit(
+                "physics",
+                "convection",
+                'nodes that move with the material carry it already; use motion.nodes = "fixed"',
+            )
+        try:
+            parts.start.stages(parts.law)
+        except ValidationError as error:
+            reasons = "; ".join(detail["msg"] for detail in error.errors())
+            raise Misfit("start", "values", f"refused by the law: {reasons}") from error
+        except ValueError as error:
+            raise Misfit(
+                "start", "values" if parts.start.by == LOAD else "by", str(error).partition(": ")[2]
+            ) from error
