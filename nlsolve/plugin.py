@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from nlsolve.contracts.component import Component
 from nlsolve.contracts.continuum.cloud import Cloud, Exact
-from nlsolve.contracts.continuum.discretizer import Discretizer, Operators
+from nlsolve.contracts.continuum.discretizer import Discretizer, Operators, PointOperators
 from nlsolve.contracts.continuum.law import ConstitutiveLaw, PowerForm, local_index, stress
 from nlsolve.contracts.continuum.scene import Scene
 from nlsolve.contracts.linear_solver import Factors, LinearSolver
@@ -39,6 +39,7 @@ __all__ = [
     "NonlinearProblem",
     "NonlinearSolver",
     "Operators",
+    "PointOperators",
     "PowerForm",
     "Predictor",
     "RefreshRule",

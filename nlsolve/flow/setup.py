@@ -37,7 +37,7 @@ class Setup:
     stop: StoppingTest = field(default_factory=StoppingTest)
     start: Start = field(default_factory=Start)
     budget: Budget = field(default_factory=Budget)
-    counterpart: Discretizer | None = None
+    error_estimator: Discretizer | None = None
     """Discretises the solved flow once more, for an estimate of its error."""
     record: tuple[float, ...] = ()
     """Times [s] at which the fields are recorded, besides the last."""

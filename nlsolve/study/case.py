@@ -15,7 +15,7 @@ from nlsolve.contracts.component import Component
 from nlsolve.contracts.system import System
 from nlsolve.flow.continuation import LOAD, Start
 from nlsolve.flow.setup import Setup
-from nlsolve.registry.problems import ABSENT, Problem, problems_in
+from nlsolve.registry.problems import ABSENT, Problem, problems_in, unknown
 from nlsolve.registry.registry import CONTRACTS, Registry
 from nlsolve.results.verdicts import names_settings
 from nlsolve.solving.stopping import Budget, StoppingTest
@@ -24,16 +24,18 @@ from nlsolve.study.sweeps import Document, Point, leaves
 SECTIONS = tuple(part.name for part in fields(Setup))
 """The parts of a study that a case is made of, and that can be swept."""
 
-DEFAULT_KINDS = {"linear": {"kind": "superlu"}, "starter": {"kind": "newton"}, "predictor": {"kind": "previous"}}
+DEFAULT_KINDS = {noun: {"kind": each.default_kind} for noun, (each, *_) in CONTRACTS.items() if each.default_kind} | {
+    "starter": {"kind": "newton"}
+}
 """Sections that may be left out, or written without a kind."""
 
-DEFAULTS_OF_KINDS = {"solver": "refresh", "discretizer": "counterpart"}
-"""Sections whose default the kind of another one names, as `default_refresh` and `default_counterpart`."""
+DEFAULTS_OF_KINDS = {"solver": "refresh", "discretizer": "error_estimator"}
+"""Sections whose default the kind of another one names, as `default_refresh` and `default_error_estimator`."""
 
 OF_A_SYSTEM = tuple(part.name for part in fields(AlgebraicSetup))
 """Those of them that a scene without a flow has: F(u) = 0 knows no law, no discretizer, no way to a first state."""
 
-DEFAULT_KINDS_OF_A_SYSTEM = {"linear": {"kind": "superlu"}, "solver": {"kind": "robust"}}
+DEFAULT_KINDS_OF_A_SYSTEM = {"linear": DEFAULT_KINDS["linear"], "solver": {"kind": "robust"}}
 """The same where the scene is a system of equations: it may be solved without a choice of the method."""
 
 DIGEST_LETTERS = 12
@@ -80,7 +82,7 @@ class Composer:
         parts: dict[str, Any] = {noun: (registry.union(noun), ...) for noun in CONTRACTS if noun in SECTIONS} | {
             "refresh": (registry.union("refresh"), None),  # absent only when there is no solver to ask for its default
             "starter": (registry.union("solver"), ...),
-            "counterpart": (registry.union("discretizer"), None),
+            "error_estimator": (registry.union("discretizer"), None),
             "stop": (StoppingTest, StoppingTest()),
             "start": (Start, Start()),
             "budget": (Budget, Budget()),
@@ -114,7 +116,14 @@ class Composer:
         needless = [name for name in document if name not in sections]
         if needless:
             sentence = "a scene that is a system of equations has no such section: leave it out"
-            raise Invalid([Problem((name,), ABSENT, sentence) for name in needless])
+            raise Invalid(
+                [
+                    Problem((name,), ABSENT, sentence)
+                    if name in SECTIONS
+                    else unknown((name,), ABSENT, "no such section", SECTIONS)
+                    for name in needless
+                ]
+            )
         for section, default in (DEFAULT_KINDS_OF_A_SYSTEM if of_a_system else DEFAULT_KINDS).items():
             _complete(document, section, default)
         for noun, section in DEFAULTS_OF_KINDS.items():

@@ -28,6 +28,10 @@ class Scene(Component, ABC):
     """
 
     noun: ClassVar[str] = "scene"
+    moving_wall: ClassVar[str | None] = None
+    """The boundary group within the contour; a conservative form takes force and torque from its nodes. None: every
+    form takes them through the contour.
+    """
 
     horizon: float | None = Field(None, gt=0, description="end of the march [s]; absent: one steady state")
     increment: float = Field(1e-4, gt=0, description="time step of the march [s]")
@@ -128,5 +132,5 @@ class Scene(Component, ABC):
         return None
 
     def contour(self) -> Array | None:
-        """A closed polygon (C, 2) around the moving wall, in the material, for force and torque; None without one."""
+        """A closed polygon (C, 2) in the material around the moving wall, for force and torque; None: no such wall."""
         return None
