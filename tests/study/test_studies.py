@@ -310,7 +310,7 @@ class TestComplaints:
 
     def test_start_by_a_field_the_law_is_not_continued_by(self, tmp_path):
         message = complaint(tmp_path, ("[solver]", '[start]\nby = "idx"\n[solver]'))
-        assert "line 13: start.by = 'idx': the law 'honey' is not continued by it; it is by index" in message
+        assert "line 13: start.by = 'idx': the law 'honey' is continued by index only" in message
 
     def test_tables_name_columns_that_exist(self, tmp_path):
         message = complaint(tmp_path, ('value = "branches"', 'value = "brnches"'))
@@ -401,7 +401,7 @@ class TestMoved:
         ("change", "options", "where"),
         [
             (('kind = "box"', 'kind = "box"\nflank = "left"'), {}, "line 5"),
-            (('"solver.order" =', '"scene.flank" ='), {}, "line 17"),
+            (('"solver.order" =', '"scene.flank" ='), {}, "line 16"),
             (('"scene.side" =', '"scene.flank" ='), {"quick": True}, "line 25"),
             (('kind = "box"', 'kind = "box"'), {"overrides": {"scene.flank": "left"}}, "--set"),
         ],

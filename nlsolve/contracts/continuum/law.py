@@ -58,8 +58,8 @@ class ConstitutiveLaw(Component, ABC):
         `by` names the field that is varied. Raises ValueError when the law is not continued by it.
         """
         if by not in self.continued_by:
-            fields = f"it is by {', '.join(self.continued_by)}" if self.continued_by else "it is by none of its fields"
-            raise ValueError(f"start.by = {by!r}: the law {self.kind_name()!r} is not continued by it; {fields}")
+            fields = f"{', '.join(self.continued_by)} only" if self.continued_by else "none of its fields"
+            raise ValueError(f"start.by = {by!r}: the law {self.kind_name()!r} is continued by {fields}")
         target = getattr(self, by)
         larger = self.continued_by[by] == "larger"
         easier = [value for value in values if (value > target if larger else value < target)]

@@ -100,7 +100,7 @@ def test_yielding_laws_are_continued_by_less_yield_stress_and_growth() -> None:
     assert [step.yield_stress for step in law.continuation("yield_stress", (1.0, 5.0, 40.0))] == [1.0, 5.0, 20.0]
     assert [step.growth for step in law.continuation("growth", (0.1, 1.0, 1e3))] == [0.1, 1.0, 10.0]
     for without_index in (Bingham(), SellarsTegart()):
-        with pytest.raises(ValueError, match=r"start\.by = 'index': .* it is by regularization"):
+        with pytest.raises(ValueError, match=r"start\.by = 'index': .* is continued by regularization.* only"):
             without_index.continuation("index", (1.0,))
 
 
