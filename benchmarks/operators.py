@@ -104,7 +104,7 @@ def against_another_library(repeats: int) -> None:
         for degree, support in ((2, 12), (3, 20)):
             case = setup("rbf", nodes, degree=degree, support=support, balanced=False)
             cloud, ours = case.scene.cloud(case.law), case.discretizer
-            points = ours.operators(cloud, False).strain_points
+            points = ours.operators(cloud, False).strain.points
             options = {"n": support, "phi": "phs3", "order": degree}
             seconds = [
                 median_seconds(work, repeats)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from nlsolve.algebra.system import System
 from nlsolve.contracts.component import Component
 from nlsolve.contracts.continuum.cloud import Cloud, Exact
-from nlsolve.contracts.continuum.discretizer import Discretizer, Operators
+from nlsolve.contracts.continuum.discretizer import Discretizer, Operators, PointOperators
 from nlsolve.contracts.continuum.law import ConstitutiveLaw, PowerForm, local_index, stress
 from nlsolve.contracts.continuum.terms import NodeMotion, Physics, Recording, TimeSteps
 from nlsolve.contracts.linear_solver import Factors, LinearSolver
@@ -46,6 +46,7 @@ __all__ = [
     "NonlinearSolver",
     "Operators",
     "Physics",
+    "PointOperators",
     "PowerForm",
     "Predictor",
     "Preparation",

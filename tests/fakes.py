@@ -8,10 +8,10 @@ from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
 import pandas as pd
-from nlsolve.flow.setup import Progress, Record, Setup
 from pydantic import Field
 from scipy.sparse import csc_array
 
+from nlsolve.flow.setup import Progress, Record, Setup
 from nlsolve.plugin import (
     Cloud,
     Component,
@@ -22,6 +22,7 @@ from nlsolve.plugin import (
     LinearSolver,
     NonlinearSolver,
     Operators,
+    PointOperators,
     Predictor,
     RefreshRule,
     Scene,
@@ -70,6 +71,7 @@ class Honey(ConstitutiveLaw):
     """A law with an index."""
 
     kind: Literal["honey"] = "honey"
+    continued_by: ClassVar = {"index": "larger"}
     index: float = Field(0.5, gt=0, description="n")
 
     def viscosity(self, rate_squared: Any) -> Any:
@@ -84,7 +86,7 @@ class Grid(Discretizer):
 
     def operators(self, cloud: Cloud, volumetric: bool) -> Operators:
         strain = csc_array(np.eye(6, 8, 2))
-        return Operators(strain, csc_array(np.eye(2, 6, 4)), cloud.nodes[:2])
+        return Operators(PointOperators(strain, csc_array(np.eye(2, 6, 4)), cloud.nodes[:2]))
 
     def gradient(self, cloud: Cloud) -> tuple[Any, Any]:
         return csc_array((4, 4)), csc_array((4, 4))

@@ -18,6 +18,8 @@ class Component(BaseModel):
 
     noun: ClassVar[str] = "component"
     """What the contract is called in a study file: "law", "scene", …; set by each contract."""
+    default_kind: ClassVar[str | None] = None
+    """The kind that a study gets which names none, set by the contract; None: a study must name one."""
 
     def with_(self, **changes: Any) -> Self:
         """A copy with some fields changed, validated like a new one."""

@@ -41,6 +41,7 @@ class LinearSolver(Component, ABC):
     """Factorises sparse matrices. Iterative refinement is asked for here and carried out, and counted, outside."""
 
     noun: ClassVar[str] = "linear"
+    default_kind: ClassVar[str | None] = "superlu"
 
     refinement: int = Field(0, ge=0, description="steps of iterative refinement after each triangular solve")
 

@@ -135,13 +135,20 @@ class Section:
     """A section of a study file that a scene asks for.
 
     contract : what is written there; of a contract with kinds, any installed kind.
-    default : the table that a section without a kind is completed with; None: it must name its kind, or has none.
+    default : the table that a section without a kind is completed with; None: the contract's own default kind.
     of : another section, whose class names the default of this one as `default_SECTION`; None there: no such component.
     """
 
     contract: type[Component]
     default: Mapping[str, Any] | None = None
     of: str = ""
+
+    @property
+    def default_table(self) -> Mapping[str, Any] | None:
+        """What is written there by default: `default`, else the contract's own default kind."""
+        if self.default is None and self.contract.default_kind is not None:
+            return {"kind": self.contract.default_kind}
+        return self.default
 
 
 class Misfit(ValueError):

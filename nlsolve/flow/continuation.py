@@ -36,11 +36,11 @@ class Stage:
 class Start(Component):
     """The first state is solved with `by` at each of `values` that is easier than the target, then at the target.
 
-    `by` is a field of the law (larger values are easier) or "load" (smaller ones are). The starting method does it,
-    with a new tangent each iteration; the work is counted apart from the march (columns `start_…`). An adaptive
-    continuation begins with the first of `values`, tries the second next, and goes on in steps of log(`by`), halved
-    where a stage fails and doubled where it was easy. Without values a steady scene is the case's own method's from
-    rest on.
+    `by` is one of the fields by which the law is continued, or "load" (a smaller one is easier). The starting method
+    solves the stages, with a new tangent each iteration; its work is counted apart from the march (columns `start_…`).
+    An adaptive continuation begins with the first of `values`, tries the second next, and goes on in steps of
+    log(`by`), halved where a stage fails and doubled where it was easy. With no values, the case's own method solves a
+    steady scene from rest.
 
     A perturbation moves the guess that each solve of the case's own method begins with: in a steady scene the state
     after the continuation (or rest), in a march the state that each increment begins with. Equations stay the same.

@@ -61,14 +61,14 @@ class Flow(NonlinearProblem):
         body_force: Array | None = None,
     ) -> None:
         self.cloud, self.operators, self.law = cloud, operators, law
-        self.is_gradient = operators.node_areas is not None and convection is None
+        self.is_gradient = operators.is_conservative and convection is None
         self._free = node_major(cloud.interior)
         lifted = np.zeros(2 * len(cloud.nodes))
         lifted[node_major(cloud.boundary)] = boundary_velocity.ravel()
         self._lifted = lifted
-        self._strain = operators.strain[:, self._free]
-        self._strain_boundary = operators.strain @ lifted
-        self._force = operators.force
+        self._strain = operators.strain.rate[:, self._free]
+        self._strain_boundary = operators.strain.rate @ lifted
+        self._force = operators.strain.force
         self._gradient: Any = None
         self._dilatation: Any = None
         self._inertia: Any = None
@@ -77,13 +77,14 @@ class Flow(NonlinearProblem):
         constant = np.zeros(len(self._free))
         self._modulus: Array | None = None
         self._pressure: Array | float = 0.0 if pressure is None else pressure
-        if operators.dilatation is not None and np.max(penalty_modulus) > 0.0:
-            self._modulus = np.broadcast_to(penalty_modulus, operators.dilatation.shape[0])
-            self._gradient = -operators.pressure_force @ sp.diags_array(self._modulus)
-            self._dilatation = operators.dilatation[:, self._free]
-            constant += self._gradient @ (operators.dilatation @ lifted)
+        volumetric = operators.volumetric
+        if volumetric is not None and np.max(penalty_modulus) > 0.0:
+            self._modulus = np.broadcast_to(penalty_modulus, len(volumetric.points))
+            self._gradient = -volumetric.force @ sp.diags_array(self._modulus)
+            self._dilatation = volumetric.rate[:, self._free]
+            constant += self._gradient @ (volumetric.rate @ lifted)
             if pressure is not None:
-                constant += operators.pressure_force @ pressure
+                constant += volumetric.force @ pressure
         if inertia is not None:
             self._inertia = areas * np.full(len(self._free), inertia.density_over_increment)
             constant -= self._inertia * inertia.previous[cloud.interior].ravel()
@@ -163,8 +164,8 @@ class Flow(NonlinearProblem):
         forces = np.nan_to_num(np.linalg.norm(residual.reshape(-1, 2), axis=1), nan=np.inf)
         node = int(self.cloud.interior[forces.argmax()])
         rate = np.sqrt(rate_squared(self._strain_rate(u)))
-        nearest = np.linalg.norm(self.operators.strain_points - self.cloud.nodes[node], axis=1).argmin()
-        floor = getattr(self.law, "regularization", 0.0)
+        nearest = np.linalg.norm(self.operators.strain.points - self.cloud.nodes[node], axis=1).argmin()
+        floor = self.law.regularization_rate or 0.0
         return {
             "blame_x": float(self.cloud.nodes[node, 0]),
             "blame_y": float(self.cloud.nodes[node, 1]),
@@ -188,7 +189,11 @@ class Flow(NonlinearProblem):
 
     def dilatation_rate(self, u: Array) -> Array | None:
         """tr ε̇ = div v at the volume points, shape (L,) [1/s]; None without a volumetric term."""
-        return None if self._modulus is None else self.operators.dilatation @ self.velocity(u).ravel()
+        volumetric = self.operators.volumetric
+        if self._modulus is None or volumetric is None:
+            return None
+        rate: Array = volumetric.rate @ self.velocity(u).ravel()
+        return rate
 
     def pressure(self, u: Array) -> Array | None:
         """p − λ tr ε̇ at the volume points, shape (L,) [MPa], the next p of an iterated penalty; None without one."""

@@ -8,7 +8,7 @@ import pandas as pd
 from nlsolve.contracts.continuum.cloud import Cloud, Indices
 from nlsolve.contracts.continuum.discretizer import Discretizer
 from nlsolve.contracts.continuum.geometry import Geometry
-from nlsolve.contracts.continuum.law import CONTRACTION, rate_squared
+from nlsolve.contracts.continuum.law import rate_squared
 from nlsolve.contracts.continuum.terms import NodeMotion
 from nlsolve.contracts.linear_solver import LinearSolver
 from nlsolve.contracts.status import SolveError, Status
@@ -54,7 +54,7 @@ def divergence(flow: Flow, velocity: Array) -> float:
     dilatation = flow.dilatation_rate(flow.unknowns(velocity))
     if dilatation is None:
         return float("nan")
-    squared = rate_squared((flow.operators.strain @ velocity.ravel()).reshape(3, -1))
+    squared = rate_squared(flow.operators.strain_rate(velocity))
     return float(np.sqrt(np.mean(dilatation**2) / np.mean(squared)))
 
 
@@ -62,14 +62,14 @@ def wall_reaction(
     scene: Geometry, motion: NodeMotion, discretizer: Discretizer, flow: Flow, velocity: Array, time: float
 ) -> dict[str, float]:
     """Force, and torque about the origin, of the moving wall on the material, with errors; empty without a contour."""
-    contour = scene.contour(motion)
+    contour, wall = scene.contour(motion), scene.moving_wall
     if contour is None:
         return {}
     u = flow.unknowns(velocity)
-    if flow.operators.strain_areas is None:
+    if wall is None or flow.operators.strain.areas is None:
         force_x, force_y, torque = _through(contour, discretizer, flow, u)
     else:
-        force_x, force_y, torque = _at_wall(_inside(contour, flow.cloud), flow, u)
+        force_x, force_y, torque = _at_wall(flow.cloud.boundaries[wall], flow, u)
     reaction = {"force_x": force_x, "force_y": force_y, "torque": torque}
     exact = scene.exact(flow.law, flow.cloud.nodes, time)
     if exact is not None and "torque" in exact.quantities:
@@ -88,12 +88,12 @@ def _through(contour: Array, discretizer: Discretizer, flow: Flow, u: Array) -> 
     edges = np.roll(contour, -1, axis=0) - contour
     middles = contour + 0.5 * edges
     n_ds = np.stack([edges[:, 1], -edges[:, 0]], axis=1)  # outward, the contour running counter-clockwise
-    values = discretizer.values(flow.operators.strain_points, middles)
+    values = discretizer.values(flow.operators.strain.points, middles)
     xx, yy, xy = (values @ component for component in flow.stress_at_points(u))
     pressure = flow.pressure(u)
-    if pressure is not None and flow.operators.volume_points is not None:
-        volumetric = discretizer.values(flow.operators.volume_points, middles) @ pressure
-        xx, yy = xx - volumetric, yy - volumetric
+    if pressure is not None and flow.operators.volumetric is not None:
+        there = discretizer.values(flow.operators.volumetric.points, middles) @ pressure
+        xx, yy = xx - there, yy - there
     traction = np.stack([xx * n_ds[:, 0] + xy * n_ds[:, 1], xy * n_ds[:, 0] + yy * n_ds[:, 1]], axis=1)
     force_x, force_y = -traction.sum(axis=0)
     torque = -float((middles[:, 0] * traction[:, 1] - middles[:, 1] * traction[:, 0]).sum())
@@ -104,29 +104,17 @@ def _at_wall(wall: Indices, flow: Flow, u: Array) -> tuple[float, float, float]:
     """Σ A σ : B w, the virtual power of a conservative form, for w a shift along x, along y, and a turn of the wall's
     nodes, with all others at rest: exactly the reactions that balance the forces inside.
     """
-    operators = flow.operators
-    assert operators.strain_areas is not None
+    strain, volumetric = flow.operators.strain, flow.operators.volumetric
     x, y = flow.cloud.nodes[wall].T
     w = np.zeros((3, len(flow.cloud.nodes), 2))
     w[0, wall, 0] = w[1, wall, 1] = 1.0
     w[2, wall, 0], w[2, wall, 1] = -y, x
     shifts = w.reshape(3, -1).T
-    weighed = (CONTRACTION[:, None] * operators.strain_areas * flow.stress_at_points(u)).ravel()
-    power = weighed @ (operators.strain @ shifts)
+    power = (strain.weights * flow.stress_at_points(u).ravel()) @ (strain.rate @ shifts)
     pressure = flow.pressure(u)
-    if pressure is not None and operators.volume_areas is not None:
-        power = power - (operators.volume_areas * pressure) @ (operators.dilatation @ shifts)
+    if pressure is not None and volumetric is not None:
+        power = power - (volumetric.weights * pressure) @ (volumetric.rate @ shifts)
     return float(power[0]), float(power[1]), float(power[2])
-
-
-def _inside(contour: Array, cloud: Cloud) -> Indices:
-    """Boundary nodes within a closed polygon (C, 2): a ray to the right meets it an odd number of times."""
-    nodes = cloud.boundary
-    x, y = cloud.nodes[nodes].T[:, :, None]
-    (ax, ay), (bx, by) = contour.T, np.roll(contour, -1, axis=0).T
-    with np.errstate(divide="ignore", invalid="ignore"):  # level edges are crossed by no level ray
-        meets = ((ay > y) != (by > y)) & (x < ax + (y - ay) / (by - ay) * (bx - ax))
-    return nodes[meets.sum(axis=1) % 2 == 1]
 
 
 def nodal_fields(
@@ -134,8 +122,8 @@ def nodal_fields(
 ) -> pd.DataFrame:
     """A row a node: place at t = 0 and now, velocity, strain rates, exact velocity (columns of `FIELDS`)."""
     nodes = flow.cloud.nodes
-    strain_rate = (flow.operators.strain @ velocity.ravel()).reshape(3, -1)
-    to_nodes = discretizer.values(flow.operators.strain_points, nodes)
+    strain_rate = flow.operators.strain_rate(velocity)
+    to_nodes = discretizer.values(flow.operators.strain.points, nodes)
     exx, eyy, exy = at_nodes = np.stack([to_nodes @ component for component in strain_rate])
     exact = scene.exact(flow.law, nodes, time)
     exact_velocity = np.full_like(nodes, np.nan) if exact is None else exact.velocity

@@ -29,7 +29,7 @@ class FlowScene(Geometry, Scene, ABC):
         "time": Section(TimeSteps),
         "motion": Section(NodeMotion),
         "discretizer": Section(Discretizer),
-        "counterpart": Section(Discretizer, of="discretizer"),
+        "error_estimator": Section(Discretizer, of="discretizer"),
         "start": Section(Start),
         "starter": Section(NonlinearSolver, {"kind": "newton"}),
         "predictor": Section(Predictor),

@@ -38,7 +38,7 @@ class FlowParts:
     refresh: RefreshRule
     starter: NonlinearSolver
     predictor: Predictor
-    counterpart: Discretizer | None = None
+    error_estimator: Discretizer | None = None
     physics: Physics = field(default_factory=Physics)
     time: TimeSteps = field(default_factory=TimeSteps)
     motion: NodeMotion = field(default_factory=NodeMotion)
@@ -145,14 +145,15 @@ class FlowState:
 
     def rate_squared_at_volume_points(self, operators: Operators) -> Array:
         """ε̄² of the velocity so far, taken at the strain point nearest to each volume point, shape (L,)."""
-        nearest = cKDTree(operators.strain_points).query(operators.volume_points)[1]
-        return rate_squared((operators.strain @ self.velocity.ravel()).reshape(3, -1)[:, nearest])
+        assert operators.volumetric is not None
+        nearest = cKDTree(operators.strain.points).query(operators.volumetric.points)[1]
+        return rate_squared(operators.strain_rate(self.velocity)[:, nearest])
 
     def between_volume_points(self, here: Operators, there: Operators) -> Any:
         """The matrix that takes pressures from the volume points of some operators to those of others."""
-        assert here.volume_points is not None
-        assert there.volume_points is not None
-        return self.parts.discretizer.values(here.volume_points, there.volume_points)
+        assert here.volumetric is not None
+        assert there.volumetric is not None
+        return self.parts.discretizer.values(here.volumetric.points, there.volumetric.points)
 
     def keep(self, flow: Flow, unknowns: Array) -> None:
         """A solved state: what is measured, and where the next solve begins."""
@@ -160,9 +161,11 @@ class FlowState:
         self.velocity = self.guess = flow.velocity(unknowns)
 
     def error_estimate(self, velocity: Array, before: Array | None) -> float:
-        """By the counterpart, of the velocity at the end of an increment and `before` it; NaN without one."""
-        if self.parts.counterpart is None:
+        """By the error estimator, of the `velocity` at the end of an increment that began with `before`; NaN without
+        one.
+        """
+        if self.parts.error_estimator is None:
             return float("nan")
-        others = self.parts.counterpart.operators(self.cloud, self.volumetric)
+        others = self.parts.error_estimator.operators(self.cloud, self.volumetric)
         flow = self.flow_of(self.parts.law, self.inertia_from(before), others=others)
         return discretization_error(flow, velocity, self.parts.linear)

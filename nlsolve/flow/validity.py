@@ -82,11 +82,11 @@ def audit(
     """
     try:
         gradient = parts.discretizer.gradient(flow.cloud)
-        to_nodes = parts.discretizer.values(flow.operators.strain_points, flow.cloud.nodes)
+        to_nodes = parts.discretizer.values(flow.operators.strain.points, flow.cloud.nodes)
         error = estimate()
     except SolveError as refusal:
         return {"doubt": f"the audits could not be made: {refusal.detail}"}
-    strain_rate = (flow.operators.strain @ velocity.ravel()).reshape(3, -1)
+    strain_rate = flow.operators.strain_rate(velocity)
     slopes = np.stack([derivative @ velocity for derivative in gradient])  # (2, N, 2): ∂/∂x and ∂/∂y of u, v
     stress_slopes = _stress_slopes(flow, strain_rate, gradient, to_nodes)
     found = {
@@ -172,7 +172,7 @@ def _residual(flow: Flow, velocity: Array) -> float:
     penalty by far the largest, it can be met while the stresses are not yet in balance.
     """
     u = flow.unknowns(velocity)
-    forces = abs(flow.operators.force) @ np.abs(flow.stress_at_points(u)).ravel()
+    forces = abs(flow.operators.strain.force) @ np.abs(flow.stress_at_points(u)).ravel()
     return _ratio(np.linalg.norm(flow.residual(u)), np.linalg.norm(forces))
 
 
@@ -183,7 +183,7 @@ def _regularization(flow: Flow, strain_rate: Array) -> dict[str, float]:
     and 22 %, whatever the share of the stress.
     """
     names = ("audit.regularization", "audit.regularization_stress", "audit.regularization_strain")
-    regularization = getattr(flow.law, "regularization", None)
+    regularization = flow.law.regularization_rate
     if regularization is None:
         return dict.fromkeys(names, np.nan)
     rate = np.sqrt(rate_squared(strain_rate))

@@ -19,6 +19,25 @@ LONGEST_VALUE = 60
 ABSENT = object()
 """Stands for a value that is not there, or not worth repeating."""
 
+MOVED: dict[str, str] = {
+    "counterpart": "error_estimator",
+    "scene.horizon": "time.horizon",
+    "scene.increment": "time.increment",
+    "scene.density": "physics.density",
+    "scene.inertia": "physics.inertia",
+    "scene.convection": "physics.convection",
+    "scene.penalty": "physics.penalty",
+    "scene.penalty_unit": "physics.penalty_unit",
+    "scene.divergence": "physics.divergence_tolerance",
+    "scene.motion_of_nodes": "motion.nodes",
+    "scene.markers": "motion.markers",
+    "scene.shifting": "motion.shifting",
+    "scene.skin": "motion.skin",
+    "scene.probe": "record.probe",
+    "budget.pressures": "physics.pressure_iterations",
+}
+"""Dotted places of sections and fields of older study files, and what these are called now."""
+
 
 class StudyError(ValueError):
     """A study that cannot be run as it is written. The message has one sentence, on its own line, for every problem."""
@@ -86,6 +105,15 @@ def did_you_mean(name: str, names: Iterable[str]) -> str:
     return f"did you mean {nearest[0]!r}?" if nearest else f"there are {', '.join(map(repr, names)) or 'none'}"
 
 
+def unknown(place: Place, value: Any, reason: str, names: Iterable[str]) -> Problem:
+    """A name that there is not: what it is called now if it had its place once, else `reason` and the nearest name."""
+    name = dotted(place)
+    for old, new in MOVED.items():
+        if f"{name}.".startswith(f"{old}."):
+            return Problem(place, ABSENT, f"this is called {new}{name.removeprefix(old)} now")
+    return Problem(place, value, f"{reason}; {did_you_mean(str(place[-1]).split('.')[0], names)}")
+
+
 def problems_in(error: ValidationError, model: type[BaseModel], document: Any) -> list[Problem]:
     """The problems pydantic found in a document, told in the document's own places; one for each place."""
     found: dict[Place, Problem] = {}
@@ -105,7 +133,7 @@ def _problem(detail: Mapping[str, Any], model: type[BaseModel], document: Any) -
     place = _place_in(document, detail["loc"], missing=kind == "missing")
     if kind == "extra_forbidden":
         names = [name for name in _fields_at(model, place[:-1], document) if name != place[-1]]
-        return Problem(place, value, f"no such field; {did_you_mean(str(place[-1]), names)}")
+        return unknown(place, value, "no such field", names)
     if kind == "missing":
         return Problem(place, ABSENT, "required, and missing")
     if kind == "kind_missing":

@@ -77,7 +77,7 @@ RUNS: dict[str, str] = {
     "velocity_error": "relative ℓ² error of the velocities of all nodes at the end, where there is an exact solution",
     "velocity_error_inside": "the same over the interior nodes alone, whose velocities are not given",
     "velocity_error_estimate": "an estimate of it without an exact solution: how much one Newton step in another "
-    "discretisation of the same nodes (section `counterpart`) would change these velocities",
+    "discretisation of the same nodes (section `error_estimator`) would change these velocities",
     "reference_error": "relative ℓ² difference of the velocities of all nodes at the end from those of the case that "
     "the study makes its reference",
     "root_error": "‖u − root‖/‖root‖ for the known root nearest to where a system ended (‖u‖ for the root 0)",

@@ -23,7 +23,7 @@ ACCEPTED = 0.05
 VARIANT = "variant"
 """Column of `runs` with the names of the settings a case was made by, where a sweep of named settings has no name."""
 
-UNDOTTED = ("record", "counterpart")
+UNDOTTED = ("record", "error_estimator")
 """Parameters of a case that are no table, or may be none."""
 
 OUTCOME, SOLVED, SPEEDUP = "outcome", "solved", "speedup"

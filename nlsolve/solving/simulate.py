@@ -162,10 +162,8 @@ class _Run:
         """The row of the case; what the simulation measures is of the last state that was kept."""
         ledger, start, status = self.ledger, self.start_ledger, outcome.status
         plain = outcome.detail in ("", status.sentence) or status is Status.CONVERGED
-        message = [
-            status.sentence if plain else f"{status.sentence}; {outcome.detail}",
-            self.simulation.place(self.blame),
-        ]
+        said = status.sentence if plain else f"{status.sentence}; {outcome.detail}"
+        place = self.simulation.place(self.blame)
         validity = self.validity_time
         if validity is None and self.simulation.increments and self.increments:
             validity = self.time  # the first tangent served to the end

@@ -15,14 +15,14 @@ from nlsolve.contracts.linear_solver import LinearSolver
 from nlsolve.contracts.nonlinear_solver import NonlinearSolver
 from nlsolve.contracts.rules.refresh import RefreshRule
 from nlsolve.contracts.scene import Misfit, Scene, Section
-from nlsolve.registry.problems import ABSENT, Problem, problems_in
+from nlsolve.registry.problems import ABSENT, Problem, problems_in, unknown
 from nlsolve.registry.registry import CONTRACTS, Registry
 from nlsolve.results.verdicts import names_settings
 from nlsolve.solving.stopping import Budget, StoppingTest
 from nlsolve.study.sweeps import Document, Point, leaves
 
 COMMON: Mapping[str, Section] = {
-    "linear": Section(LinearSolver, {"kind": "superlu"}),
+    "linear": Section(LinearSolver),
     "solver": Section(NonlinearSolver),
     "refresh": Section(RefreshRule, of="solver"),
     "stop": Section(StoppingTest),
@@ -107,9 +107,16 @@ class Composer:
         needless = [name for name in document if name not in (Scene.noun, *sections)]
         if needless:
             sentence = f"the scene {scene.kind_name()!r} has no such section: leave it out"
-            raise Invalid([Problem((name,), ABSENT, sentence) for name in needless])
+            raise Invalid(
+                [
+                    Problem((name,), ABSENT, sentence)
+                    if name in self._all
+                    else unknown((name,), ABSENT, "no such section", self.sections)
+                    for name in needless
+                ]
+            )
         for name, section in sections.items():
-            default = section.default
+            default = section.default_table
             if section.of:
                 default = getattr(
                     self.named(document, section.of, sections[section.of].contract), f"default_{name}", None

@@ -12,7 +12,7 @@ from typing import Any
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from nlsolve.registry.problems import ABSENT, Problem, Source, StudyError, did_you_mean, problems_in
+from nlsolve.registry.problems import ABSENT, Problem, Source, StudyError, did_you_mean, problems_in, unknown
 from nlsolve.registry.registry import Registry, load_registry
 from nlsolve.registry.toml_lines import Place, lines_of
 from nlsolve.results.columns import RUNS
@@ -144,11 +144,9 @@ class _Builder:
 
     def frame(self) -> Frame:
         document = {name: value for name, value in self.document.items() if name not in self.composer.sections}
-        unknown = [name for name in document if name not in Frame.model_fields]
+        strange = [name for name in document if name not in Frame.model_fields]
         names = [*Frame.model_fields, *self.composer.sections]
-        self.refuse(
-            [Problem((name,), self.document[name], f"no such section; {did_you_mean(name, names)}") for name in unknown]
-        )
+        self.refuse([unknown((name,), self.document[name], "no such section", names) for name in strange])
         try:
             frame = Frame.model_validate(document)
         except ValidationError as error:
@@ -158,7 +156,7 @@ class _Builder:
         self.refuse(
             [Problem((name,), [], "swept twice") for name in swept if swept.count(name) > 1]
             + [
-                Problem((name,), [], f"not a parameter; {did_you_mean(name.split('.')[0], self.composer.sections)}")
+                unknown((name,), [], "not a parameter", self.composer.sections)
                 for name in swept
                 if name.split(".")[0] not in self.composer.sections
             ]

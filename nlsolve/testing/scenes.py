@@ -33,7 +33,8 @@ def check_scene(scene: Scene, law: ConstitutiveLaw) -> None:
     inside = cloud.nodes[cloud.interior]
     force = scene.body_force(inside, law)
     require(force is None or force.shape == inside.shape, "body_force must have the shape of its points")
-    contour = scene.contour()
+    wall, contour = scene.moving_wall, scene.contour()
+    require(wall is None or wall in cloud.boundaries, f"the moving wall {wall!r} is none of the boundary groups")
     require(contour is None or (contour.ndim == 2 and contour.shape[1] == 2), "contour() must be a polygon (C, 2)")
     exact = scene.exact(law, cloud.nodes, 0.0)
     if exact is not None:

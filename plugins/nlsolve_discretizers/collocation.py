@@ -10,7 +10,7 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 from pydantic import Field
 
-from nlsolve.plugin import Cloud, Discretizer, Operators, SolveError
+from nlsolve.plugin import Cloud, Discretizer, Operators, PointOperators, SolveError
 from nlsolve_discretizers.conservation import conserving
 from nlsolve_discretizers.weights.assembly import Gradient, sparse_rows
 from nlsolve_discretizers.weights.diagnostics import diagnosis
@@ -42,7 +42,7 @@ class Collocation(Discretizer):
     degree: int = Field(2, ge=1, le=4, description="degree of the polynomials")
     balanced: bool = Field(True, description="supports grow until every quadrant that has nodes nearby is served")
 
-    default_counterpart: ClassVar = {"kind": "delaunay"}
+    default_error_estimator: ClassVar = {"kind": "delaunay"}
 
     weak: ClassVar[float] = 1e-3
     """Quality of a support below which it is enlarged."""
@@ -108,7 +108,7 @@ class Collocation(Discretizer):
     def moved(self, operators: Operators, cloud: Cloud) -> Operators | None:
         """With the same triangles, patches and supports, unless a triangle is turned inside out."""
         near = operators.neighbours.moved_to(cloud)
-        return self._operators(near, operators.dilatation is not None) if near.triangles.upright else None
+        return self._operators(near, operators.volumetric is not None) if near.triangles.upright else None
 
     def _operators(self, near: Neighbours, volumetric: bool) -> Operators:
         build = self._conservative if self.form == "conservative" else self._strong
@@ -118,34 +118,35 @@ class Collocation(Discretizer):
         triangles, cloud = near.triangles, near.triangles.cloud
         nodes, interior = cloud.nodes, cloud.interior
         points = triangles.midpoints() if self.points == "between" else nodes
-        strain = self._gradient(nodes, points, "strain", cloud, near.supports).strain(len(nodes))
+        rate = self._gradient(nodes, points, "strain", cloud, near.supports).strain(len(nodes))
         force = self._gradient(points, nodes[interior], "force", cloud, near.supports).divergence_of_stress(len(points))
+        strain = PointOperators(rate, force, points)
         if not volumetric:
-            return Operators(strain, force, points)
+            return Operators(strain)
         if self.volume_points == "pairs":
-            patches = triangles.patches()
-            return Operators(strain, force, points, patches.dilatation, patches.force_per_area(), patches.centres)
+            return Operators(strain, triangles.patches().strong())
         gradient = self._gradient(nodes, nodes, "volume", cloud, near.supports)
-        dilatation = gradient.divergence(len(nodes))
-        return Operators(strain, force, points, dilatation, gradient.at(interior).of_pressure(len(nodes)), nodes)
+        pressure_force = gradient.at(interior).of_pressure(len(nodes))
+        return Operators(strain, PointOperators(gradient.divergence(len(nodes)), pressure_force, nodes))
 
     def _conservative(self, near: Neighbours, volumetric: bool) -> Operators:
         triangles, cloud = near.triangles, near.triangles.cloud
         nodes = cloud.nodes
         points, areas = triangles.diamonds() if self.points == "between" else (nodes, triangles.node_areas)
         gradient = conserving(cloud, points, areas, self._gradient(nodes, points, "strain", cloud, near.supports))
-        strain = gradient.strain(len(nodes))
+        strain = PointOperators.conservative(cloud, gradient.strain(len(nodes)), points, areas)
+        node_areas = triangles.node_areas[cloud.interior]
         if not volumetric:
-            return Operators.conservative(cloud, strain, points, areas, triangles.node_areas)
+            return Operators(strain, None, node_areas)
         if self.volume_points == "pairs":
-            patches = triangles.patches()
-            volume = (patches.dilatation, patches.centres, patches.areas)
-        else:
-            gradient = conserving(
-                cloud, nodes, triangles.node_areas, self._gradient(nodes, nodes, "volume", cloud, near.supports)
-            )
-            volume = (gradient.divergence(len(nodes)), nodes, triangles.node_areas)
-        return Operators.conservative(cloud, strain, points, areas, triangles.node_areas, *volume)
+            return Operators(strain, triangles.patches().conservative(), node_areas)
+        gradient = conserving(
+            cloud, nodes, triangles.node_areas, self._gradient(nodes, nodes, "volume", cloud, near.supports)
+        )
+        dilatation = gradient.divergence(len(nodes))
+        return Operators(
+            strain, PointOperators.conservative(cloud, dilatation, nodes, triangles.node_areas), node_areas
+        )
 
     def gradient(self, cloud: Cloud) -> tuple[Any, Any]:
         """∂/∂x and ∂/∂y at the nodes."""

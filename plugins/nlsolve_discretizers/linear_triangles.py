@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Any, ClassVar, Literal
 
 import numpy as np
 import scipy.sparse as sp
 
-from nlsolve.plugin import Cloud, Discretizer, Operators
+from nlsolve.plugin import Cloud, Discretizer, Operators, PointOperators
 from nlsolve_discretizers.moving_least_squares import MovingLeastSquares
 from nlsolve_discretizers.weights.assembly import Gradient
 from nlsolve_discretizers.weights.diagnostics import diagnosis
@@ -26,7 +25,7 @@ class LinearTriangles(Discretizer):
     """
 
     kind: Literal["delaunay"] = "delaunay"
-    default_counterpart: ClassVar = {"kind": "mls"}
+    default_error_estimator: ClassVar = {"kind": "mls"}
 
     def operators(self, cloud: Cloud, volumetric: bool) -> Operators:
         """B, S and, when asked for, B_θ, S_θ, in conservative form."""
@@ -35,7 +34,7 @@ class LinearTriangles(Discretizer):
     def moved(self, operators: Operators, cloud: Cloud) -> Operators | None:
         """The same triangles and patches, unless a triangle is turned inside out."""
         triangles = operators.neighbours.moved_to(cloud)
-        return _operators(triangles, operators.dilatation is not None) if triangles.upright else None
+        return _operators(triangles, operators.volumetric is not None) if triangles.upright else None
 
     def gradient(self, cloud: Cloud) -> tuple[Any, Any]:
         """∂/∂x and ∂/∂y at the nodes: means over the triangles around each, by area."""
@@ -64,13 +63,13 @@ class LinearTriangles(Discretizer):
 
 def _operators(triangles: Triangles, volumetric: bool) -> Operators:
     cloud = triangles.cloud
-    strain = _gradient(triangles).strain(len(cloud.nodes))
-    patches = triangles.patches() if volumetric else None
-    volume = () if patches is None else (patches.dilatation, patches.centres, patches.areas)
-    operators = Operators.conservative(
-        cloud, strain, triangles.centroids(), triangles.areas, triangles.node_areas, *volume
+    rate = _gradient(triangles).strain(len(cloud.nodes))
+    return Operators(
+        PointOperators.conservative(cloud, rate, triangles.centroids(), triangles.areas),
+        triangles.patches().conservative() if volumetric else None,
+        triangles.node_areas[cloud.interior],
+        neighbours=triangles,
     )
-    return replace(operators, neighbours=triangles)
 
 
 def _gradient(triangles: Triangles) -> Gradient:

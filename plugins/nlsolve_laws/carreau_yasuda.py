@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 
 from pydantic import Field
 
@@ -17,12 +17,18 @@ class CarreauYasuda(ConstitutiveLaw):
     """
 
     kind: Literal["carreau-yasuda"] = "carreau-yasuda"
+    continued_by: ClassVar = {"index": "larger", "regularization": "larger"}
     rest_viscosity: float = Field(50.0, gt=0, description="μ₀, at rest [MPa s]")
     fast_viscosity: float = Field(0.0, ge=0, description="μ∞, at ε̄ → ∞ [MPa s]")
     time: float = Field(1.0, gt=0, description="λ, one over the rate ε̄ at which thinning sets in [s]")
     sharpness: float = Field(2.0, gt=0, description="a, of the bend between the two regimes")
     index: float = Field(0.3, gt=0, description="n")
     regularization: float = Field(1e-2, ge=0, description="ε₀ [1/s]")
+
+    @property
+    def regularization_rate(self) -> float:
+        """ε₀."""
+        return self.regularization
 
     def viscosity(self, rate_squared: Any) -> Any:
         """μ(ε̄²) for ε̄² [1/s²]."""

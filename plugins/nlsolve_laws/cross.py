@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, Literal, Self
+from typing import Any, ClassVar, Literal, Self
 
 from pydantic import Field, model_validator
 
@@ -17,11 +17,17 @@ class Cross(ConstitutiveLaw):
     """
 
     kind: Literal["cross"] = "cross"
+    continued_by: ClassVar = {"index": "larger", "regularization": "larger"}
     rest_viscosity: float = Field(50.0, gt=0, description="μ₀, at rest [MPa s]")
     fast_viscosity: float = Field(0.0, ge=0, description="μ∞, at ε̄ → ∞; at most μ₀ [MPa s]")
     time: float = Field(1.0, gt=0, description="λ, one over the rate ε̄ at which μ is halfway to μ∞ [s]")
     index: float = Field(0.3, gt=0, le=1, description="n; n = 1 is the Newtonian (μ₀ + μ∞)/2")
     regularization: float = Field(1e-2, ge=0, description="ε₀ [1/s]")
+
+    @property
+    def regularization_rate(self) -> float:
+        """ε₀."""
+        return self.regularization
 
     @model_validator(mode="after")
     def _thins(self) -> Self:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 from pydantic import Field
@@ -13,9 +13,16 @@ from nlsolve.plugin import ConstitutiveLaw, PowerForm
 class _Yielding(ConstitutiveLaw):
     """What Bingham's and Herschel and Bulkley's laws share: below σ_y they creep at rates of 1/m or ε₀, the larger."""
 
+    continued_by: ClassVar = {"regularization": "larger", "yield_stress": "smaller", "growth": "smaller"}
+
     yield_stress: float = Field(20.0, ge=0, description="σ_y, equivalent (√3 times that in shear); 0: none [MPa]")
     growth: float = Field(10.0, gt=0, description="m of Papanastasiou: the larger, the stiffer below σ_y [s]")
     regularization: float = Field(1e-2, gt=0, description="ε₀ [1/s]")
+
+    @property
+    def regularization_rate(self) -> float:
+        """ε₀."""
+        return self.regularization
 
     def _rate(self, rate_squared: Any) -> Any:
         """e = √(ε̄² + ε₀²): (1 − exp(−m e))/e holds odd powers of e, which are not analytic in ε̄² at rest."""
@@ -34,6 +41,7 @@ class HerschelBulkley(_Yielding):
     """
 
     kind: Literal["herschel-bulkley"] = "herschel-bulkley"
+    continued_by: ClassVar = {"index": "larger", **_Yielding.continued_by}
     consistency: float = Field(40.0, gt=0, description="K [MPa sⁿ]")
     index: float = Field(0.3, gt=0, description="n")
 

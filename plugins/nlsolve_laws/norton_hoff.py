@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 
 from pydantic import Field
 
@@ -17,9 +17,15 @@ class NortonHoff(ConstitutiveLaw):
     """
 
     kind: Literal["norton-hoff"] = "norton-hoff"
+    continued_by: ClassVar = {"index": "larger", "regularization": "larger"}
     consistency: float = Field(40.0, gt=0, description="K [MPa s^m]")
     index: float = Field(0.2, gt=0, description="m, sensitivity to the strain rate")
     regularization: float = Field(1e-2, ge=0, description="ε₀ [1/s]")
+
+    @property
+    def regularization_rate(self) -> float:
+        """ε₀."""
+        return self.regularization
 
     def viscosity(self, rate_squared: Any) -> Any:
         """μ(ε̄²) for ε̄² [1/s²]."""

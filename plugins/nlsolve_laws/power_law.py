@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 
 from pydantic import Field
 
@@ -17,11 +17,17 @@ class PowerLaw(ConstitutiveLaw):
     """
 
     kind: Literal["power-law"] = "power-law"
+    continued_by: ClassVar = {"index": "larger", "regularization": "larger"}
     consistency: float = Field(2.69e10, gt=0, description="k [MPa sⁿ K^−A]")
     temperature_exponent: float = Field(-3.3155, description="A")
     temperature: float = Field(300.0, gt=0, description="T [K]")
     index: float = Field(0.1324, gt=0, description="n")
     regularization: float = Field(1e-2, ge=0, description="ε₀ [1/s]")
+
+    @property
+    def regularization_rate(self) -> float:
+        """ε₀."""
+        return self.regularization
 
     def viscosity(self, rate_squared: Any) -> Any:
         """μ(ε̄²) for ε̄² [1/s²]."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 from pydantic import Field
@@ -23,12 +23,18 @@ class SellarsTegart(ConstitutiveLaw):
     """
 
     kind: Literal["sellars-tegart"] = "sellars-tegart"
+    continued_by: ClassVar = {"regularization": "larger"}
     stress_factor: float = Field(0.0141, gt=0, description="α [1/MPa]")
     stress_exponent: float = Field(5.41, gt=0, description="n")
     rate_factor: float = Field(1.027e9, gt=0, description="A [1/s]")
     activation_energy: float = Field(129.4e3, ge=0, description="Q [J/mol]")
     temperature: float = Field(750.0, gt=0, description="T [K]")
     regularization: float = Field(1e-2, ge=0, description="ε₀ [1/s]")
+
+    @property
+    def regularization_rate(self) -> float:
+        """ε₀."""
+        return self.regularization
 
     def viscosity(self, rate_squared: Any) -> Any:
         """μ(ε̄²) for ε̄² [1/s²]."""

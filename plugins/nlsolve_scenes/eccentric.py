@@ -24,6 +24,7 @@ class EccentricCylinders(FlowScene):
     """
 
     kind: Literal["eccentric-cylinders"] = "eccentric-cylinders"
+    moving_wall: ClassVar = "inner"
     inner_radius: float = Field(1.0, gt=0, description="r_i [mm]")
     outer_radius: float = Field(2.0, gt=0, description="r_o [mm]")
     eccentricity: float = Field(0.5, gt=0, description="e, distance of the outer centre from the inner, along x [mm]")
@@ -81,7 +82,7 @@ class EccentricCylinders(FlowScene):
         return jittered(Cloud(nodes, groups), self.jitter, self.seed)
 
     def boundary_position(self, cloud: Cloud, time: float) -> np.ndarray:
-        """Where they were: circles that spin stay where they are."""
+        """Circles that spin stay where they are."""
         return cloud.nodes[cloud.boundary]
 
     def boundary_velocity(self, cloud: Cloud, law: ConstitutiveLaw, time: float) -> np.ndarray:

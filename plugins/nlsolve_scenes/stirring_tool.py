@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal, Self
+from typing import Annotated, ClassVar, Literal, Self
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -28,6 +28,7 @@ class StirringTool(FlowScene):
     """
 
     kind: Literal["stirring-tool"] = "stirring-tool"
+    moving_wall: ClassVar = "tool"
     motion: Literal["spin", "orbit"] = Field(
         "spin", description="the tool spins about its centre, or translates along a circle"
     )

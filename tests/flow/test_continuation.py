@@ -100,7 +100,7 @@ def test_the_load_scales_and_leaves_the_law_alone() -> None:
     [
         (Start(by="load"), r"start\.values = \[1\.0, 0\.5, 0\.3, 0\.2\]: a load grows to 1"),
         (Start(by="load", values=(0.0, 0.5)), "increasing values between 0 and 1"),
-        (Start(by="lod"), r"start\.by = 'lod': the law 'power-law' has no such field"),
+        (Start(by="lod"), r"start\.by = 'lod': the law 'power-law' is continued by index, regularization only"),
         (Start(by="regularization", adaptive=True), r"start\.by = 'regularization': .* the law's is 0"),
     ],
 )
@@ -121,7 +121,7 @@ def test_a_study_is_told_in_its_own_place() -> None:
     with pytest.raises(StudyError, match=r"start\.values = .*: a load grows to 1"):
         Study.from_dict(document)
     document["start"] = {"by": "regularisation"}
-    with pytest.raises(StudyError, match=r"start\.by = 'regularisation': the law 'power-law' has no such field"):
+    with pytest.raises(StudyError, match=r"start\.by = 'regularisation': the law 'power-law' is continued by index, "):
         Study.from_dict(document)
 
 

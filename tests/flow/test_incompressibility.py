@@ -22,7 +22,7 @@ from nlsolve import SolveError, Status
 from nlsolve.flow.incompressibility import DEPTH, pressure_mixing
 from nlsolve.flow.march import march
 from nlsolve.flow.momentum import Flow
-from nlsolve.plugin import Discretizer, Scene
+from nlsolve.plugin import Discretizer, Operators, PointOperators, Scene
 from nlsolve.series import Array
 from nlsolve.solving.stopping import Budget, StoppingTest
 
@@ -258,14 +258,11 @@ class TestNoLocking:
         cloud = scene.cloud(law)
         operators = LinearTriangles().operators(cloud, True)
         if each:
-            m = len(operators.strain_points)
-            trace = operators.strain[:m] + operators.strain[m : 2 * m]
-            free = np.stack([2 * cloud.interior, 2 * cloud.interior + 1], axis=1).ravel()
-            assert operators.strain_areas is not None
-            back = -(trace[:, free].T.multiply(operators.strain_areas)).tocsr()
-            operators = type(operators)(
-                operators.strain, operators.force, operators.strain_points, trace, back, operators.strain_points
-            )
+            strain = operators.strain
+            m = len(strain.points)
+            trace = strain.rate[:m] + strain.rate[m : 2 * m]
+            assert strain.areas is not None
+            operators = Operators(strain, PointOperators.conservative(cloud, trace, strain.points, strain.areas))
         modulus = penalty * float(law.viscosity(np.array([1.0]))[0])
         flow = Flow(cloud, operators, law, scene.boundary_velocity(cloud, law, 0.0), modulus)
         start = np.zeros(2 * len(cloud.interior))

@@ -81,8 +81,8 @@ def test_residual_is_the_sum_of_its_terms_written_out(index: float) -> None:
     u = near(problem, 0.5) * 1.1
     v = problem.velocity(u)
     free = node_major(CLOUD.interior)
-    internal = operators.force @ stress(PowerLaw(index=index), (operators.strain @ v.ravel()).reshape(3, -1)).ravel()
-    volumetric = 50.0 * (operators.pressure_force @ (operators.dilatation @ v.ravel()))
+    internal = operators.strain.force @ stress(PowerLaw(index=index), operators.strain_rate(v)).ravel()
+    volumetric = 50.0 * (operators.volumetric.force @ (operators.volumetric.rate @ v.ravel()))
     inertia = 2.81 * (v - 0.5 * SPEED.velocity).ravel()[free]
     expected = inertia - internal - volumetric - np.tile([3.0, -2.0], len(CLOUD.interior))
     np.testing.assert_allclose(problem.residual(u), expected, rtol=0.0, atol=1e-11 * problem.scale(u))

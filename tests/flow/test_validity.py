@@ -262,11 +262,11 @@ GRADED = GradedRings(first=0.08, growth=0.15, spacing=0.4)
         (EccentricCylinders(penalty=1e4), 1.0, MovingLeastSquares(points="nodes")),
     ],
 )
-def test_the_estimate_misses_the_error_by_that_of_the_counterpart(scene: Any, index: float, discretizer: Any) -> None:
+def test_the_estimate_misses_the_error_by_that_of_the_estimator(scene: Any, index: float, discretizer: Any) -> None:
     """|‖v − v′‖ − ‖v − v_exact‖| ≤ ‖v′ − v_exact‖, and more as one is over ‖v‖, the other over ‖v_exact‖. A tenth more
     because v′ is one Newton step from v.
     """
-    row = summary(scene, index, discretizer=discretizer, counterpart=TRIANGLES)
+    row = summary(scene, index, discretizer=discretizer, error_estimator=TRIANGLES)
     others = summary(scene, index, discretizer=TRIANGLES)["velocity_error_inside"]
     error, estimate = row["velocity_error_inside"], row["velocity_error_estimate"]
     assert others < error / 2.0
@@ -275,7 +275,7 @@ def test_the_estimate_misses_the_error_by_that_of_the_counterpart(scene: Any, in
 
 def test_a_wrong_field_without_another_blemish_is_in_doubt_by_the_estimate() -> None:
     plain, estimated = (
-        summary(spin(nodes=GRADED), 0.1324, discretizer=MovingLeastSquares(degree=1), counterpart=other)
+        summary(spin(nodes=GRADED), 0.1324, discretizer=MovingLeastSquares(degree=1), error_estimator=other)
         for other in (None, TRIANGLES)
     )
     assert plain["velocity_error_inside"] > 0.05
@@ -289,6 +289,6 @@ def test_an_estimate_that_cannot_be_made_says_so() -> None:
         def operators(self, cloud: Cloud, volumetric: bool) -> Any:
             raise SolveError(Status.BAD_CLOUD, "the triangles are inside out")
 
-    row = summary(spin(), counterpart=Fails())
+    row = summary(spin(), error_estimator=Fails())
     assert row["status"] == "converged"
     assert row["doubt"] == "the audits could not be made: the triangles are inside out"

@@ -182,3 +182,10 @@ def test_entry_points_are_loaded_one_at_a_time(tmp_path, monkeypatch):
 
 def test_the_installed_registry_is_loaded_once():
     assert load_registry() is load_registry()
+
+
+def test_the_default_kind_of_a_contract_is_installed():
+    defaults = {noun: contracts[0].default_kind for noun, contracts in CONTRACTS.items() if contracts[0].default_kind}
+    assert defaults == {"linear": "superlu", "predictor": "previous"}
+    for noun, kind in defaults.items():
+        assert kind in load_registry().classes(noun)

@@ -7,9 +7,10 @@ import tomllib
 import pytest
 from fakes import STUDY, Box, Homotopy, Newton, registry_of, write_study
 
-from nlsolve.registry.problems import StudyError
+from nlsolve.registry.problems import MOVED, StudyError
 from nlsolve.registry.toml_lines import lines_of, nearest_line
-from nlsolve.study.study import Study
+from nlsolve.study.case import SECTIONS
+from nlsolve.study.study import Frame, Study
 from nlsolve.study.sweeps import parse_assignments
 
 REGISTRY = registry_of()
@@ -307,9 +308,9 @@ class TestComplaints:
         message = complaint(tmp_path, text=text)
         assert "line 16: stop.kind = 'claim': the solver 'newton' never claims a solution" in message
 
-    def test_start_by_a_field_the_law_does_not_have(self, tmp_path):
+    def test_start_by_a_field_the_law_is_not_continued_by(self, tmp_path):
         message = complaint(tmp_path, ("[solver]", '[start]\nby = "idx"\n[solver]'))
-        assert "line 13: start.by = 'idx': the law 'honey' has no such field; it has index" in message
+        assert "line 13: start.by = 'idx': the law 'honey' is continued by index only" in message
 
     def test_tables_name_columns_that_exist(self, tmp_path):
         message = complaint(tmp_path, ('value = "branches"', 'value = "brnches"'))
@@ -367,6 +368,53 @@ class TestComplaints:
     def test_every_problem_has_its_line(self, tmp_path):
         message = complaint(tmp_path, ('kind = "honey"', 'kind = "honey"\nindex = -1.0'), ('"box"', '"bx"'))
         assert [line.split(": ")[1].split(" =")[0] for line in message.splitlines()] == ["scene.kind", "law.index"]
+
+
+class TestMoved:
+    """What was called otherwise once is answered with its name now, wherever it is written."""
+
+    def test_a_section_in_the_file(self, tmp_path):
+        message = complaint(tmp_path, ("[solver]", '[counterpart]\nkind = "grid"\n[solver]'))
+        assert message == "/study.toml, line 12: counterpart: this is called error_estimator now"
+        assert read(tmp_path, ("[solver]", '[error_estimator]\nkind = "grid"\n[solver]')).cases
+
+    def test_a_section_in_a_sweep(self, tmp_path):
+        sweep = '[[sweep]]\ngrid = { "counterpart.width" = [1.0] }\n[[table]]'
+        message = complaint(tmp_path, ("[[table]]", sweep))
+        assert message == "/study.toml, line 19: counterpart.width: this is called error_estimator.width now"
+        each = EACH + '[[sweep]]\neach = [{ name = "a", counterpart = { kind = "grid" } }]\n'
+        message = complaint(tmp_path, text=each)
+        assert message == "/study.toml, line 22: counterpart: this is called error_estimator now"
+
+    def test_a_section_by_hand_in_quick_and_in_a_reference(self, tmp_path):
+        message = complaint(tmp_path, overrides={"counterpart.kind": "grid"})
+        assert message == "/study.toml, --set: counterpart: this is called error_estimator now"
+        quick = '"scene.side" = "right"', '"counterpart.kind" = "grid"'
+        message = complaint(tmp_path, quick, quick=True)
+        assert message == "/study.toml, line 25: counterpart: this is called error_estimator now"
+        reference = "[quick]", "[reference]\ncounterpart.width = 2.0\n[quick]"
+        assert "counterpart: this is called error_estimator now" in complaint(tmp_path, reference)
+        misspelt = "[quick]", "[reference]\nsolvr.order = 2\n[quick]"
+        assert "solvr: no such section; did you mean 'solver'?" in complaint(tmp_path, misspelt)
+
+    @pytest.mark.parametrize(
+        ("change", "options", "where"),
+        [
+            (('kind = "box"', 'kind = "box"\nflank = "left"'), {}, "line 5"),
+            (('"solver.order" =', '"scene.flank" ='), {}, "line 16"),
+            (('"scene.side" =', '"scene.flank" ='), {"quick": True}, "line 25"),
+            (('kind = "box"', 'kind = "box"'), {"overrides": {"scene.flank": "left"}}, "--set"),
+        ],
+    )
+    def test_a_field_wherever_it_is_written(self, tmp_path, monkeypatch, change, options, where):
+        monkeypatch.setitem(MOVED, "scene.flank", "place.side")
+        plain = STUDY.replace('rows = "solver.order"', 'rows = "solver.kind"')
+        message = complaint(tmp_path, change, text=plain, **options)
+        assert message == f"/study.toml, {where}: scene.flank: this is called place.side now"
+
+    def test_every_new_place_exists(self):
+        assert all(new.split(".")[0] in {*SECTIONS, *Frame.model_fields} for new in MOVED.values())
+        assert not any(old in {*SECTIONS, *Frame.model_fields} for old in MOVED)
 
 
 class TestLines:

@@ -30,62 +30,68 @@ from nlsolve.series import Array
 
 
 @dataclass(frozen=True)
+class PointOperators:
+    """A pair B, S or B_θ, S_θ at P points, with c = 3 components a point (strain rates) or 1 (dilatation rates).
+
+    rate : B, values at the nodes -> rates at the points, sparse (c P, 2N).
+    force : S, stresses there -> force at the interior nodes, sparse (2F, c P).
+    points : where they are, (P, 2) [mm].
+    areas : A, of the points of a conservative form, (P,) [mm²]; None of a strong one.
+    """
+
+    rate: Any
+    force: Any
+    points: Array
+    areas: Array | None = None
+
+    @classmethod
+    def conservative(cls, cloud: Cloud, rate: Any, points: Array, areas: Array) -> PointOperators:
+        """S = −Bᵀ A at the interior nodes."""
+        free = np.stack([2 * cloud.interior, 2 * cloud.interior + 1], axis=1).ravel()
+        weighed = sp.diags_array(_weights(areas, rate.shape[0] // len(points)))
+        return cls(rate, (-(rate[:, free].T @ weighed)).tocsr(), points, areas)
+
+    @property
+    def weights(self) -> Array:
+        """The diagonal of A, (c P,), xy counted twice; of a conservative form only."""
+        assert self.areas is not None
+        return _weights(self.areas, self.rate.shape[0] // len(self.points))
+
+
+def _weights(areas: Array, components: int) -> Array:
+    return np.outer(CONTRACTION, areas).ravel() if components == len(CONTRACTION) else areas
+
+
+@dataclass(frozen=True)
 class Operators:
     """The operators of one cloud.
 
-    dilatation, pressure_force, volume_points : None when no volumetric term was asked for.
-    node_areas, strain_areas, volume_areas : W (F,), A (M,) and A_θ (L,) [mm²] of a conservative form, else None.
+    strain : B and S, at M points.
+    volumetric : B_θ and S_θ, at L points; None when no volumetric term was asked for.
+    node_areas : W of a conservative form, (F,) [mm²]; None of a strong one.
     neighbours : what the discretizer found on the cloud and may keep while nodes move; nobody else looks at it.
     """
 
-    strain: Any
-    force: Any
-    strain_points: Array
-    dilatation: Any = None
-    pressure_force: Any = None
-    volume_points: Array | None = None
+    strain: PointOperators
+    volumetric: PointOperators | None = None
     node_areas: Array | None = None
-    strain_areas: Array | None = None
-    volume_areas: Array | None = None
     neighbours: Any = None
 
-    @classmethod
-    def conservative(
-        cls,
-        cloud: Cloud,
-        strain: Any,
-        strain_points: Array,
-        strain_areas: Array,
-        node_areas: Array,
-        dilatation: Any = None,
-        volume_points: Array | None = None,
-        volume_areas: Array | None = None,
-    ) -> Operators:
-        """S = −Bᵀ A and S_θ = −B_θᵀ A_θ at the interior nodes; `node_areas` (N,) of all nodes."""
-        free = np.stack([2 * cloud.interior, 2 * cloud.interior + 1], axis=1).ravel()
-        weighed = np.outer(CONTRACTION, strain_areas).ravel()
-        force = (-(strain[:, free].T @ sp.diags_array(weighed))).tocsr()
-        pressure_force = None
-        if dilatation is not None:
-            pressure_force = (-(dilatation[:, free].T @ sp.diags_array(volume_areas))).tocsr()
-        return cls(
-            strain,
-            force,
-            strain_points,
-            dilatation,
-            pressure_force,
-            volume_points,
-            node_areas[cloud.interior],
-            strain_areas,
-            volume_areas,
-        )
+    @property
+    def is_conservative(self) -> bool:
+        """True when R is in [N/mm], the force on the material around each node."""
+        return self.node_areas is not None
+
+    def strain_rate(self, velocity: Array) -> Array:
+        """ε̇ at the M strain points, (3, M) ordered xx, yy, xy [1/s], of the `velocity` (N, 2) of all nodes."""
+        return (self.strain.rate @ velocity.ravel()).reshape(3, -1)
 
 
 class Discretizer(Component, ABC):
     """Turns a cloud into operators."""
 
     noun: ClassVar[str] = "discretizer"
-    default_counterpart: ClassVar[Mapping[str, Any] | None] = None
+    default_error_estimator: ClassVar[Mapping[str, Any] | None] = None
     """The discretizer that estimates the error of this one's solutions when a study names none: one of another kind,
     whose errors are not the same; None: no estimate.
     """

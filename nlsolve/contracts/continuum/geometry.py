@@ -46,3 +46,8 @@ class Geometry(Component, ABC):
     def contour(self, motion: NodeMotion) -> Array | None:
         """A closed polygon (C, 2) around the moving wall, in the material, for force and torque; None without one."""
         return None
+
+    @property
+    def moving_wall(self) -> str | None:
+        """The boundary group whose nodes are the moving wall that `contour` surrounds; None without a contour."""
+        return None

@@ -7,8 +7,9 @@ series the coefficients of the homotopy. Units: mm, s, MPa, tonne.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, ClassVar, TypeVar
+from typing import Any, ClassVar, Literal, TypeVar
 
 import numpy as np
 
@@ -35,6 +36,8 @@ class ConstitutiveLaw(Component, ABC):
     """A viscous law S = 2 μ(ε̄²) ε̇, analytic for ε̄² ≥ 0."""
 
     noun: ClassVar[str] = "law"
+    continued_by: ClassVar[Mapping[str, Literal["larger", "smaller"]]] = {}
+    """The fields in which the law can be made easier to solve, and which of their values are the easier ones."""
 
     @abstractmethod
     def viscosity(self, rate_squared: Number) -> Number:
@@ -44,16 +47,22 @@ class ConstitutiveLaw(Component, ABC):
         """The pure power law this law tends to, for scenes with a closed solution; None if it is no power law."""
         return None
 
+    @property
+    def regularization_rate(self) -> float | None:
+        """ε₀ [1/s], the strain rate below which the viscosity is the regularization's own; None without one."""
+        return None
+
     def continuation(self, by: str, values: tuple[float, ...]) -> list[ConstitutiveLaw]:
         """Easier laws to pass through on the way to this one, in order, ending with this one itself.
 
-        `by` names the field that is varied. Raises ValueError when the law has no such field.
+        `by` names the field that is varied. Raises ValueError when the law is not continued by it.
         """
-        if by not in type(self).model_fields:
-            fields = ", ".join(name for name in type(self).model_fields if name != "kind")
-            raise ValueError(f"start.by = {by!r}: the law {self.kind_name()!r} has no such field; it has {fields}")
+        if by not in self.continued_by:
+            fields = f"{', '.join(self.continued_by)} only" if self.continued_by else "none of its fields"
+            raise ValueError(f"start.by = {by!r}: the law {self.kind_name()!r} is continued by {fields}")
         target = getattr(self, by)
-        easier = [value for value in values if value > target]
+        larger = self.continued_by[by] == "larger"
+        easier = [value for value in values if (value > target if larger else value < target)]
         return [self.with_(**{by: value}) for value in easier] + [self]
 
 

@@ -18,6 +18,7 @@ class Predictor(Component, ABC):
     """The first guess of an increment from the increments before, all of one Δt."""
 
     noun: ClassVar[str] = "predictor"
+    default_kind: ClassVar[str | None] = "previous"
 
     @property
     @abstractmethod

@@ -17,7 +17,7 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.spatial import Delaunay, QhullError
 
-from nlsolve.plugin import Cloud, SolveError, Status
+from nlsolve.plugin import Cloud, PointOperators, SolveError, Status
 
 
 @dataclass(frozen=True)
@@ -178,9 +178,13 @@ class Patches:
     areas: np.ndarray
     centres: np.ndarray
 
-    def force_per_area(self) -> Any:
+    def strong(self) -> PointOperators:
         """S_θ = −W⁻¹ B_θᵀ A (2F, L) at the interior nodes, per area W of their material."""
         inside = self.triangles.cloud.interior
         free = np.stack([2 * inside, 2 * inside + 1], axis=1).ravel()
         per_area = sp.diags_array(-1.0 / np.repeat(self.triangles.node_areas[inside], 2))
-        return (per_area @ self.net_flux[:, free].T).tocsr()
+        return PointOperators(self.dilatation, (per_area @ self.net_flux[:, free].T).tocsr(), self.centres)
+
+    def conservative(self) -> PointOperators:
+        """S_θ = −B_θᵀ A (2F, L) at the interior nodes."""
+        return PointOperators.conservative(self.triangles.cloud, self.dilatation, self.centres, self.areas)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -221,11 +222,9 @@ class Twisted(MovingLeastSquares):
 
     def operators(self, cloud: Cloud, volumetric: bool) -> Operators:
         full = super().operators(cloud, volumetric)
-        strain = full.strain.tolil()
-        strain[2 * len(full.strain_points) :, 1::2] = 0.0
-        return Operators(
-            strain.tocsr(), full.force, full.strain_points, full.dilatation, full.pressure_force, full.volume_points
-        )
+        rate = full.strain.rate.tolil()
+        rate[2 * len(full.strain.points) :, 1::2] = 0.0
+        return replace(full, strain=replace(full.strain, rate=rate.tocsr()))
 
 
 class Lopsided(LinearTriangles):
@@ -233,7 +232,7 @@ class Lopsided(LinearTriangles):
 
     def operators(self, cloud: Cloud, volumetric: bool) -> Operators:
         full = super().operators(cloud, volumetric)
-        return Operators(**(vars(full) | {"force": 2.0 * full.force}))
+        return replace(full, strain=replace(full.strain, force=2.0 * full.strain.force))
 
 
 def test_the_check_of_discretizers_can_fail() -> None:
@@ -259,18 +258,18 @@ def test_operators_differentiate_polynomials_of_their_degree_exactly(discretizer
     """B on velocities x^i y^j, S on stresses x^i y^j, on jittered clouds."""
     cloud = Channel(spacing=0.2, jitter=0.3, seed=seed).cloud(PowerLaw())
     operators = discretizer.operators(cloud, False)
-    nodes, points, inside = cloud.nodes, operators.strain_points, cloud.nodes[cloud.interior]
-    strain_size = float(abs(operators.strain).sum(axis=1).max())
-    force_size = float(abs(operators.force).sum(axis=1).max())
+    nodes, points, inside = cloud.nodes, operators.strain.points, cloud.nodes[cloud.interior]
+    strain_size = float(abs(operators.strain.rate).sum(axis=1).max())
+    force_size = float(abs(operators.strain.force).sum(axis=1).max())
     for exponents in monomials(discretizer.degree):
         value = power(nodes, exponents, (0, 0))
         along = power(points, exponents, (1, 0)), power(points, exponents, (0, 1))
-        rate = operators.strain @ np.stack([value, 2.0 * value], axis=1).ravel()
+        rate = operators.strain.rate @ np.stack([value, 2.0 * value], axis=1).ravel()
         expected = np.concatenate([along[0], 2.0 * along[1], 0.5 * along[1] + along[0]])
         np.testing.assert_allclose(rate, expected, atol=1e-10 * strain_size * 2**discretizer.degree)
         s = power(points, exponents, (0, 0))
         slope = power(inside, exponents, (1, 0)), power(inside, exponents, (0, 1))
-        force = operators.force @ np.concatenate([s, 3.0 * s, -s])
+        force = operators.strain.force @ np.concatenate([s, 3.0 * s, -s])
         expected = np.stack([slope[0] - slope[1], -slope[0] + 3.0 * slope[1]], axis=1).ravel()
         np.testing.assert_allclose(force, expected, atol=1e-10 * force_size * 3 * 2**discretizer.degree)
 
@@ -284,7 +283,7 @@ LOWEST = 7.2  # eigenvalue of −div 2 ε̇ there, walls held; 7.19 by linear tr
 def minus_divergence(discretizer: Discretizer, cloud: Cloud) -> Array:
     """−W⁻¹ S 2 B on the unknowns."""
     operators = discretizer.operators(cloud, False)
-    matrix = -(operators.force @ (2.0 * operators.strain[:, node_major(cloud.interior)])).toarray()
+    matrix = -(operators.strain.force @ (2.0 * operators.strain.rate[:, node_major(cloud.interior)])).toarray()
     return matrix if operators.node_areas is None else matrix / np.repeat(operators.node_areas, 2)[:, None]
 
 

@@ -56,7 +56,9 @@ def test_patches_cover_every_triangle_once(cloud: Cloud) -> None:
 @pytest.mark.parametrize("cloud", CLOUDS.values(), ids=CLOUDS)
 def test_every_patch_has_a_node_that_moves(cloud: Cloud) -> None:
     """A patch held by walls only has a dilatation that no unknown can change: a penalty on it would be an error."""
-    dilatation = MovingLeastSquares().operators(cloud, True).dilatation[:, node_major(cloud.interior)]
+    volumetric = MovingLeastSquares().operators(cloud, True).volumetric
+    assert volumetric is not None
+    dilatation = volumetric.rate[:, node_major(cloud.interior)]
     assert abs(dilatation).sum(axis=1).min() > 0.0
 
 
@@ -103,17 +105,17 @@ def test_volumetric_operators_of_the_strong_form_are_adjoint(cloud: Cloud) -> No
     triangles = Triangles.of(cloud)
     patch_area = np.bincount(triangles.pairs(), triangles.areas)
     free = node_major(cloud.interior)
-    left = sp.diags_array(np.repeat(triangles.node_areas[cloud.interior], 2)) @ operators.pressure_force
-    right = -(sp.diags_array(patch_area) @ operators.dilatation[:, free]).T
+    left = sp.diags_array(np.repeat(triangles.node_areas[cloud.interior], 2)) @ operators.volumetric.force
+    right = -(sp.diags_array(patch_area) @ operators.volumetric.rate[:, free]).T
     assert abs(left - right).max() <= 1e-13 * abs(right).max()
 
 
 def test_there_is_about_one_volume_point_a_node_and_far_more_strain_points() -> None:
     cloud = StirringTool().cloud(PowerLaw())
     operators = MovingLeastSquares().operators(cloud, True)
-    assert operators.volume_points is not None
-    assert 0.8 < len(operators.volume_points) / len(cloud.nodes) < 1.2
-    assert 2.0 < len(operators.strain_points) / len(cloud.nodes) < 3.1
+    assert operators.volumetric is not None
+    assert 0.8 < len(operators.volumetric.points) / len(cloud.nodes) < 1.2
+    assert 2.0 < len(operators.strain.points) / len(cloud.nodes) < 3.1
 
 
 # The patch test.
@@ -124,10 +126,10 @@ def test_there_is_about_one_volume_point_a_node_and_far_more_strain_points() -> 
 def test_constant_stress_and_pressure_exert_no_force(discretizer: Discretizer, cloud: Cloud) -> None:
     """Σ_q A_q ∇φ_i(x_q) = 0, the discrete divergence theorem."""
     operators = discretizer.operators(cloud, True)
-    m, count = len(operators.strain_points), operators.dilatation.shape[0]
+    m, count = len(operators.strain.points), len(operators.volumetric.points)
     for force, constant in (
-        (operators.force, np.repeat([3.0, -1.0, 2.0], m)),
-        (operators.pressure_force, np.ones(count)),
+        (operators.strain.force, np.repeat([3.0, -1.0, 2.0], m)),
+        (operators.volumetric.force, np.ones(count)),
     ):
         assert np.abs(force @ constant).max() < 1e-10 * float((abs(force) @ np.abs(constant)).max())
 
@@ -205,15 +207,17 @@ def test_what_leaves_one_node_enters_its_neighbours(discretizer: Discretizer) ->
     """With no node held, Σ_i f_i = 0 and Σ_i x_i × f_i = 0 for any stress whatever: force and torque balance."""
     cloud = CLOUDS["rings"]
     operators = discretizer.operators(cloud, True)
-    areas = np.outer([1.0, 1.0, 2.0], operators.strain_areas).ravel()
+    areas = np.outer([1.0, 1.0, 2.0], operators.strain.areas).ravel()
     stress = np.random.default_rng(2).standard_normal(len(areas))
-    pressure = np.random.default_rng(3).standard_normal(operators.dilatation.shape[0])
-    force = operators.strain.T @ (areas * stress) + operators.dilatation.T @ (operators.volume_areas * pressure)
+    pressure = np.random.default_rng(3).standard_normal(len(operators.volumetric.points))
+    force = operators.strain.rate.T @ (areas * stress) + operators.volumetric.rate.T @ (
+        operators.volumetric.areas * pressure
+    )
     f_x, f_y = force.reshape(-1, 2).T
     x, y = cloud.nodes.T
     assert abs(f_x.sum()) + abs(f_y.sum()) < 1e-10 * np.abs(force).sum()
     assert abs((x * f_y - y * f_x).sum()) < 1e-10 * np.abs(x * f_y).sum()
-    inside = operators.force @ stress + operators.pressure_force @ pressure
+    inside = operators.strain.force @ stress + operators.volumetric.force @ pressure
     np.testing.assert_allclose(inside, -force[node_major(cloud.interior)], atol=1e-12 * np.abs(force).max())
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 import pytest
@@ -41,7 +41,13 @@ class Negative(ConstitutiveLaw):
         return 1.0 - rate_squared
 
 
+class Misnamed(PowerLaw):
+    continued_by: ClassVar = {"indx": "larger"}
+
+
 def test_the_check_of_laws_can_fail() -> None:
+    with pytest.raises(AssertionError, match=r"continued by \['indx'\], which are none of its fields"):
+        check_law(Misnamed())
     with pytest.raises(AssertionError, match="by seed"):
         check_law(WithoutTaylor())
     with pytest.raises(AssertionError, match="positive finite"):
@@ -89,8 +95,17 @@ def test_continuation_passes_through_easier_laws_only() -> None:
     law = PowerLaw(index=0.25)
     assert [step.index for step in law.continuation("index", (1.0, 0.5, 0.3, 0.2))] == [1.0, 0.5, 0.3, 0.25]
     assert [step.regularization for step in law.continuation("regularization", (10.0, 1.0))] == [10.0, 1.0, 1e-2]
-    with pytest.raises(ValueError, match=r"no such field; it has consistency, .*index"):
+    with pytest.raises(ValueError, match=r"'indx'.* is continued by index, regularization only$"):
         law.continuation("indx", (1.0,))
+    with pytest.raises(ValueError, match=r"'temperature'.* is continued by index, regularization only$"):
+        law.continuation("temperature", (1.0,))
+    with pytest.raises(ValueError, match=r"the law 'negative' is continued by none of its fields"):
+        Negative().continuation("index", (1.0,))
+
+
+def test_a_law_says_what_its_regularization_is() -> None:
+    assert PowerLaw(regularization=0.5).regularization_rate == 0.5
+    assert Negative().regularization_rate is None
 
 
 @pytest.mark.parametrize(

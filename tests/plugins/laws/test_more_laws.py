@@ -90,6 +90,20 @@ def test_power_forms_are_the_laws_without_regularization() -> None:
         assert law.power_form() is None
 
 
+@pytest.mark.parametrize("name", LAWS)
+def test_laws_declare_their_regularization(name: str) -> None:
+    assert LAWS[name].with_(regularization=0.3).regularization_rate == 0.3
+
+
+def test_yielding_laws_are_continued_by_less_yield_stress_and_growth() -> None:
+    law = Bingham(yield_stress=20.0, growth=10.0)
+    assert [step.yield_stress for step in law.continuation("yield_stress", (1.0, 5.0, 40.0))] == [1.0, 5.0, 20.0]
+    assert [step.growth for step in law.continuation("growth", (0.1, 1.0, 1e3))] == [0.1, 1.0, 10.0]
+    for without_index in (Bingham(), SellarsTegart()):
+        with pytest.raises(ValueError, match=r"start\.by = 'index': .* is continued by regularization.* only"):
+            without_index.continuation("index", (1.0,))
+
+
 # Special cases and limits.
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 import pytest
@@ -164,6 +164,16 @@ def test_shear_stress_of_the_exact_spin_times_radius_squared_is_constant(index: 
     exact = StirringTool().exact(law, np.array([[1.5, 0.0]]), 0.0)
     assert exact is not None
     np.testing.assert_allclose(-moment, exact.quantities["torque"], rtol=1e-5)
+
+
+class NoSuchWall(StirringTool):
+    kind: Literal["no-such-wall"] = "no-such-wall"  # type: ignore[assignment]
+    moving_wall: ClassVar = "hammer"
+
+
+def test_the_check_of_scenes_asks_for_the_group_of_the_moving_wall() -> None:
+    with pytest.raises(AssertionError, match="the moving wall 'hammer' is none of the boundary groups"):
+        check_scene(NoSuchWall(), PowerLaw())
 
 
 class Newtonian(ConstitutiveLaw):
