@@ -50,8 +50,8 @@ class Setting(BaseModel):
 class Sweep(BaseModel):
     """Values for parameters: every combination (`grid`), side by side (`zip`), or named settings one by one (`each`).
 
-    grid = { law.index = [1.0, 0.5], scene.penalty = [0.0, 1e2] }                        four points
-    zip = { law.index = [1.0, 0.5], scene.penalty = [0.0, 1e2] }                         two points
+    grid = { law.index = [1.0, 0.5], physics.penalty = [0.0, 1e2] }                        four points
+    zip = { law.index = [1.0, 0.5], physics.penalty = [0.0, 1e2] }                         two points
     each = [ { name = "p = 40", solver = { kind = "anm", order = 40 } },
              { name = "ε₀ = 10", "law.regularization" = 10.0 }, { name = "as it is" } ]  three points
 

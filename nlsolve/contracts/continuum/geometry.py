@@ -17,6 +17,10 @@ class Geometry(Component, ABC):
 
     keeps_nodes: ClassVar[str | None] = None
     """Why nodes must stay where they are, "material leaves the channel"; None where they may move with the material."""
+    moving_wall: ClassVar[str | None] = None
+    """The boundary group within the contour; a conservative form takes force and torque from its nodes. None: every
+    form takes them through the contour.
+    """
 
     @property
     @abstractmethod
@@ -45,9 +49,4 @@ class Geometry(Component, ABC):
 
     def contour(self, motion: NodeMotion) -> Array | None:
         """A closed polygon (C, 2) around the moving wall, in the material, for force and torque; None without one."""
-        return None
-
-    @property
-    def moving_wall(self) -> str | None:
-        """The boundary group whose nodes are the moving wall that `contour` surrounds; None without a contour."""
         return None

@@ -8,7 +8,7 @@ switches them on.
 
 from __future__ import annotations
 
-from typing import Annotated, ClassVar, Literal, Self
+from typing import Annotated, Any, ClassVar, Literal, Self
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -124,3 +124,10 @@ class Recording(Component):
         (), description="times at which the fields are recorded, besides the last [s]"
     )
     probe: tuple[float, float] | None = Field(None, description="place whose nearest node is recorded in time [mm]")
+
+    @model_validator(mode="before")
+    @classmethod
+    def _is_a_table(cls, given: Any) -> Any:
+        if isinstance(given, list | tuple):
+            raise ValueError(f"should be a table now: record = {{ times = {list(given)} }}")
+        return given

@@ -79,7 +79,7 @@ def snapshots_of(spec: NodesFigure, frames: Frames, columns: Sequence[str]) -> l
 
 def _half_increment(run: pd.Series, time: float) -> float:
     """How far from the time asked for a record may be without a word; rounding only when increments are unknown."""
-    increment = pd.to_numeric(run.get("scene.increment", np.nan), errors="coerce")
+    increment = pd.to_numeric(run.get("time.increment", np.nan), errors="coerce")
     return 0.5 * (1 + 1e-6) * float(increment) if np.isfinite(increment) else 1e-9 * time
 
 
