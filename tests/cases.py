@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import Any
 
-from nlsolve.flow.setup import Setup
 from nlsolve_discretizers import MovingLeastSquares
 from nlsolve_laws import PowerLaw
 from nlsolve_linear.superlu import SuperLU
@@ -14,9 +13,11 @@ from nlsolve_scenes import StirringTool
 from nlsolve_scenes.nodes.rings import Rings
 from nlsolve_solvers import Newton
 
+from nlsolve.contracts.continuum.geometry import Geometry
 from nlsolve.contracts.outcome import Outcome
 from nlsolve.flow.momentum import Flow
-from nlsolve.plugin import NonlinearProblem, NonlinearSolver, RefreshRule, Scene
+from nlsolve.flow.state import FlowParts
+from nlsolve.plugin import NonlinearProblem, NonlinearSolver, RefreshRule
 from nlsolve.series import Array
 from nlsolve.solving.driver import solve
 from nlsolve.solving.ledger import Ledger
@@ -58,8 +59,8 @@ def run(
     return solve(problem, solver, tangent, start, test, Budget(iterations=iterations), ledger), ledger
 
 
-def setup(scene: Scene, index: float = 0.5, **parts: Any) -> Setup:
-    """A case: Newton on the default discretisation, but for the parts given."""
+def setup(scene: Geometry, index: float = 0.5, **parts: Any) -> FlowParts:
+    """A case of a flow: Newton on the default discretisation, but for the parts given."""
     given: dict[str, Any] = {
         "law": PowerLaw(index=index, regularization=1e-3),
         "discretizer": MovingLeastSquares(),
@@ -70,4 +71,4 @@ def setup(scene: Scene, index: float = 0.5, **parts: Any) -> Setup:
         "predictor": Previous(),
         "stop": StoppingTest(tolerance=1e-10),
     }
-    return Setup(scene=scene, **(given | parts))
+    return FlowParts(scene=scene, **(given | parts))

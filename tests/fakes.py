@@ -11,7 +11,7 @@ import pandas as pd
 from pydantic import Field
 from scipy.sparse import csc_array
 
-from nlsolve.flow.setup import Progress, Record, Setup
+from nlsolve.flow.state import FlowParts
 from nlsolve.plugin import (
     Cloud,
     Component,
@@ -30,6 +30,7 @@ from nlsolve.plugin import (
     hookimpl,
 )
 from nlsolve.registry.registry import Registry
+from nlsolve.solving.simulate import Progress, Record
 
 
 class Even(Component):
@@ -224,7 +225,7 @@ def write_study(folder: Path, *changes: tuple[str, str], text: str = STUDY) -> P
 
 
 def fake_march(
-    setup: Setup, listen: Callable[[Progress], None] | None = None, clock: Callable[[], float] | None = None
+    setup: FlowParts, listen: Callable[[Progress], None] | None = None, clock: Callable[[], float] | None = None
 ) -> Record:
     """A record whose numbers follow from the solver's parameters."""
     order, tolerance = getattr(setup.solver, "order", 1), getattr(setup.solver, "tolerance", 1.0)

@@ -10,7 +10,6 @@ from typing import Any, Literal
 import numpy as np
 import pytest
 import scipy.sparse as sp
-from nlsolve.algebra.simulation import Algebraic, AlgebraicSetup, displacement, root_error, solve_system
 from nlsolve_linear.superlu import SuperLU
 from nlsolve_rules.energy import Energy
 from nlsolve_rules.refresh import EveryIteration
@@ -21,6 +20,7 @@ from typer.testing import CliRunner
 
 import nlsolve
 from nlsolve.algebra.colouring import Compression, groups_of
+from nlsolve.algebra.root_search import Algebraic, AlgebraicSetup, displacement, root_error, solve_system
 from nlsolve.cli.app import app
 from nlsolve.contracts.status import Status
 from nlsolve.plugin import NonlinearSolver, Step, System, hookimpl

@@ -14,8 +14,8 @@ from nlsolve_linear.superlu import SuperLU
 from nlsolve_scenes import Channel, StirringTool
 from nlsolve_scenes.nodes.rings import GradedRings, Rings
 
-from nlsolve.flow.march import march
 from nlsolve.plugin import Scene
+from nlsolve.solving.simulate import run_case as march
 
 
 def solved(scene: Scene, index: float, **parts: Any) -> dict[str, Any]:

@@ -17,8 +17,8 @@ from pydantic import ValidationError
 from nlsolve import Status, Study
 from nlsolve.contracts.outcome import Outcome
 from nlsolve.flow.continuation import Stage, Start, walk
-from nlsolve.flow.march import march
 from nlsolve.registry.problems import StudyError
+from nlsolve.solving.simulate import run_case as march
 from nlsolve.solving.stopping import Budget
 
 COARSE = Rings(spacing=0.5)

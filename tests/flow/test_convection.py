@@ -16,10 +16,10 @@ from nlsolve_solvers.homotopy import AsymptoticNumericalMethod
 from nlsolve_solvers.modified_newton import ModifiedNewton
 from pydantic import ValidationError
 
-from nlsolve.flow.march import march
 from nlsolve.flow.momentum import Convection, Flow, Inertia
 from nlsolve.plugin import ConstitutiveLaw, Scene
 from nlsolve.series import Array
+from nlsolve.solving.simulate import run_case as march
 from nlsolve.testing import check_problem
 
 VISCOUS = NortonHoff(consistency=1.0, index=1.0)  # μ = 1 MPa s

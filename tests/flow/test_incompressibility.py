@@ -20,10 +20,10 @@ from scipy.sparse import csr_array
 
 from nlsolve import SolveError, Status
 from nlsolve.flow.incompressibility import DEPTH, pressure_mixing
-from nlsolve.flow.march import march
 from nlsolve.flow.momentum import Flow
 from nlsolve.plugin import Discretizer, Operators, PointOperators, Scene
 from nlsolve.series import Array
+from nlsolve.solving.simulate import run_case as march
 from nlsolve.solving.stopping import Budget, StoppingTest
 
 # Mixing.

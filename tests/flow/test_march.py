@@ -10,7 +10,6 @@ import numpy as np
 import pandas as pd
 import pytest
 from cases import setup
-from nlsolve.flow.setup import Progress, Record
 from nlsolve_discretizers import LinearTriangles, MovingLeastSquares
 from nlsolve_laws import PowerLaw
 from nlsolve_rules import Cubic, Energy, FullSteps, NonMonotone
@@ -25,9 +24,10 @@ from pydantic import ValidationError
 
 from nlsolve import SolveError, Status
 from nlsolve.flow.continuation import Start
-from nlsolve.flow.march import march
 from nlsolve.plugin import Cloud, Operators, Step
 from nlsolve.results.columns import FIELDS, RUNS, STEPS
+from nlsolve.solving.simulate import Progress, Record
+from nlsolve.solving.simulate import run_case as march
 from nlsolve.solving.stopping import Budget, StoppingTest
 
 COARSE = Rings(spacing=0.5)

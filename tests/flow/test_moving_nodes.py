@@ -15,11 +15,11 @@ from pydantic import ValidationError
 from scipy.integrate import solve_ivp
 
 from nlsolve import SolveError, Status
-from nlsolve.flow.march import march
 from nlsolve.flow.moving_nodes import LARGEST_SHIFT, Markers, MovingNodes, halfway, runge_kutta, shifts
 from nlsolve.plugin import Cloud
 from nlsolve.show.figures import draw
 from nlsolve.show.figures.nodes.cloud import CloudFigure
+from nlsolve.solving.simulate import run_case as march
 from nlsolve.solving.stopping import StoppingTest
 
 OMEGA, TURN = 100.0, 0.02 * np.pi

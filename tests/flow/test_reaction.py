@@ -15,11 +15,11 @@ from nlsolve_scenes.nodes.rings import GradedRings, Rings
 from nlsolve_solvers import Newton
 
 from nlsolve.contracts.continuum.law import CONTRACTION
-from nlsolve.flow.march import march
 from nlsolve.flow.momentum import Flow
 from nlsolve.flow.observables import wall_reaction
 from nlsolve.plugin import Discretizer, Scene
 from nlsolve.series import Array
+from nlsolve.solving.simulate import run_case as march
 from nlsolve.solving.stopping import StoppingTest
 
 CONSERVATIVE = {

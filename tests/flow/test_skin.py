@@ -19,9 +19,9 @@ from nlsolve_scenes.nodes.rings import Rings
 from nlsolve_solvers.modified_newton import ModifiedNewton
 from pydantic import ValidationError
 
-from nlsolve.flow.march import march
 from nlsolve.flow.moving_nodes import MovingNodes, Neighbourhoods
 from nlsolve.plugin import Cloud, Discretizer, Operators
+from nlsolve.solving.simulate import run_case as march
 from nlsolve.solving.stopping import StoppingTest
 from nlsolve.testing import check_discretizer
 

@@ -15,11 +15,11 @@ from nlsolve_scenes.nodes.rings import GradedRings, Rings
 
 from nlsolve import SolveError, Status
 from nlsolve.cli.app import left_out
-from nlsolve.flow.march import march
 from nlsolve.flow.momentum import Flow
 from nlsolve.flow.validity import HEAT_CAPACITY, LIMITS, audit
 from nlsolve.plugin import Cloud, ConstitutiveLaw
 from nlsolve.results.columns import RUNS
+from nlsolve.solving.simulate import run_case as march
 from nlsolve.solving.stopping import StoppingTest
 
 COARSE = Rings(spacing=0.5)

@@ -13,7 +13,6 @@ from fakes import STUDY, registry_of, write_study
 from hypothesis import given
 from hypothesis import strategies as st
 from matplotlib.figure import Figure
-from nlsolve.flow.setup import Record
 from nlsolve_rules.refresh import EveryIteration, PoorContraction
 from nlsolve_scenes import StirringTool
 from nlsolve_scenes.nodes.rings import Rings
@@ -24,7 +23,6 @@ from pydantic import TypeAdapter, ValidationError
 
 import nlsolve
 from nlsolve import SolveError, Status
-from nlsolve.flow.march import march
 from nlsolve.flow.state import sample
 from nlsolve.plugin import Factors, LinearSolver, NonlinearProblem
 from nlsolve.registry.problems import StudyError
@@ -39,6 +37,8 @@ from nlsolve.running.timing import ORDER, calibrate, measure
 from nlsolve.show.figures import BaseFigure, FigureError, FigureSpec, draw
 from nlsolve.show.figures.style import ACCENT
 from nlsolve.show.tables import TableSpec, build
+from nlsolve.solving.simulate import Record
+from nlsolve.solving.simulate import run_case as march
 from nlsolve.study.study import Study
 from nlsolve.testing.toy_problem import SmallProblem
 
@@ -537,7 +537,7 @@ def timed(monkeypatch: pytest.MonkeyPatch) -> list[float]:
             raise ZeroDivisionError
         return Record({"status": "converged", "message": "", "seconds": taken, "branches": 1}, pd.DataFrame())
 
-    monkeypatch.setattr("nlsolve.running.runner.march", march_of)
+    monkeypatch.setattr("nlsolve.running.runner.run_case", march_of)
     return seconds
 
 

@@ -19,12 +19,12 @@ from nlsolve_solvers.modified_newton import ModifiedNewton
 
 from nlsolve import SolveError, Status
 from nlsolve.flow.continuation import Start
-from nlsolve.flow.march import march
 from nlsolve.flow.momentum import Flow
 from nlsolve.plugin import Discretizer
 from nlsolve.series import Array
 from nlsolve.solving.driver import solve
 from nlsolve.solving.ledger import Audited, Ledger
+from nlsolve.solving.simulate import run_case as march
 from nlsolve.solving.stopping import Budget, StoppingTest
 from nlsolve.solving.tangent import Tangent
 from nlsolve.testing import check_solver

@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 import pytest
 from cases import setup
-from nlsolve.flow.setup import Record
 from nlsolve_rules.predictors import Polynomial, Previous
 from nlsolve_rules.refresh import PoorContraction
 from nlsolve_scenes import StirringTool
@@ -16,8 +15,9 @@ from nlsolve_solvers.modified_newton import ModifiedNewton
 from pydantic import ValidationError
 from scipy.special import binom
 
-from nlsolve.flow.march import march
 from nlsolve.plugin import Predictor
+from nlsolve.solving.simulate import Record
+from nlsolve.solving.simulate import run_case as march
 from nlsolve.solving.stopping import StoppingTest
 from nlsolve.testing import check_predictor
 

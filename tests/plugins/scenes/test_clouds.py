@@ -23,9 +23,9 @@ from scipy.spatial import Delaunay, Voronoi, cKDTree
 
 from nlsolve import SolveError, Status
 from nlsolve.flow.continuation import Start
-from nlsolve.flow.march import march
 from nlsolve.plugin import Cloud, ConstitutiveLaw, Scene
 from nlsolve.series import Array
+from nlsolve.solving.simulate import run_case as march
 from nlsolve.testing import check_scene
 
 LAW = PowerLaw()

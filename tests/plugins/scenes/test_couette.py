@@ -16,9 +16,9 @@ from scipy.integrate import quad
 
 from nlsolve.contracts.continuum.law import stress
 from nlsolve.flow.continuation import Start
-from nlsolve.flow.march import march
 from nlsolve.plugin import ConstitutiveLaw, Exact, Scene
 from nlsolve.series import Array
+from nlsolve.solving.simulate import run_case as march
 from nlsolve.testing import check_scene
 
 LAWS: dict[str, ConstitutiveLaw] = {

@@ -17,9 +17,9 @@ from scipy.spatial import cKDTree
 
 from nlsolve import SolveError, Status
 from nlsolve.contracts.continuum.law import stress
-from nlsolve.flow.march import march
 from nlsolve.plugin import ConstitutiveLaw, Scene
 from nlsolve.series import Array
+from nlsolve.solving.simulate import run_case as march
 from nlsolve.testing import check_scene
 
 VISCOUS = NortonHoff(consistency=1.0, index=1.0)  # μ = 1 MPa s

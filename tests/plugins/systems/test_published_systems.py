@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from nlsolve.algebra.simulation import Algebraic
 from nlsolve_systems import Bratu, Chandrasekhar, PLaplacian, Published
 from nlsolve_systems.burkardt import hammarling
 from nlsolve_systems.catalogue import MORE, PROBLEMS, TEST_NONLIN
 from nlsolve_systems.roots import COMPUTED
 from pydantic import ValidationError
 
+from nlsolve.algebra.root_search import Algebraic
 from nlsolve.plugin import System
 from nlsolve.testing import check_system
 
