@@ -36,7 +36,7 @@ TERMS: dict[str, dict[str, Any]] = {
     "all": {
         "inertia": Inertia(DENSITY / 0.01, 0.7 * EXACT),
         "penalty_modulus": 50.0,
-        "pressure": np.linspace(-1.0, 1.0, OPERATORS.dilatation.shape[0]),
+        "pressure": np.linspace(-1.0, 1.0, len(OPERATORS.volumetric.points)),
         "body_force": SCENE.body_force(CLOUD.nodes[CLOUD.interior], VISCOUS),
     },
 }

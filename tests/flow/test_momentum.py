@@ -19,6 +19,7 @@ from nlsolve import Status
 from nlsolve.contracts.continuum.law import stress
 from nlsolve.flow.momentum import Flow, Inertia, node_major
 from nlsolve.solving.simulate import run_case as march
+from nlsolve.plugin import PointOperators
 from nlsolve.solving.stopping import Budget
 from nlsolve.testing import check_problem
 
@@ -99,11 +100,12 @@ def test_velocity_puts_the_boundary_back_and_unknowns_take_it_away() -> None:
 def test_terms_left_out_are_absent_not_zero() -> None:
     """Without a penalty the volumetric operators are not touched, were they anything at all."""
     plain = MovingLeastSquares().operators(CLOUD, False)
-    assert plain.dilatation is None
-    assert plain.pressure_force is None
+    assert plain.volumetric is None
     law = PowerLaw()
     held = SCENE.boundary_velocity(CLOUD, law, 0.0)
-    problem = Flow(CLOUD, replace(plain, dilatation=object(), pressure_force=object()), law, held, penalty_modulus=0.0)
+    anything: Any = object()
+    volumetric = replace(plain, volumetric=PointOperators(anything, anything, anything))
+    problem = Flow(CLOUD, volumetric, law, held, penalty_modulus=0.0)
     u = near(problem, 0.5)
     assert problem.pressure(u) is None
     same = flow("between", law.index).residual(u)
