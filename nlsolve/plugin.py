@@ -12,22 +12,20 @@ from nlsolve.contracts.nonlinear_solver import KeptTangent, NonlinearSolver, Ste
 from nlsolve.contracts.problem import Expansion, NonlinearProblem
 from nlsolve.contracts.rules.globalization import Globalization, Search
 from nlsolve.contracts.rules.predictor import Predictor
-from nlsolve.contracts.rules.refresh import Evidence, RefreshRule
+from nlsolve.contracts.rules.refresh import RefreshRule, TangentHistory
 from nlsolve.contracts.status import SolveError, Status
 from nlsolve.contracts.system import System
 from nlsolve.registry.hookspecs import hookimpl
 from nlsolve.registry.nested import Globalized
-from nlsolve.series import Series, upright
+from nlsolve.series import NoSeries, Series, as_column
 from nlsolve.solving.anderson_mixing import Mixing
-from nlsolve.solving.cached_jacobian import AssembledOnce
+from nlsolve.solving.cached_jacobian import cached_jacobian
 
 __all__ = [
-    "AssembledOnce",
     "Cloud",
     "Component",
     "ConstitutiveLaw",
     "Discretizer",
-    "Evidence",
     "Exact",
     "Expansion",
     "Factors",
@@ -36,6 +34,7 @@ __all__ = [
     "KeptTangent",
     "LinearSolver",
     "Mixing",
+    "NoSeries",
     "NonlinearProblem",
     "NonlinearSolver",
     "Operators",
@@ -49,8 +48,10 @@ __all__ = [
     "Status",
     "Step",
     "System",
+    "TangentHistory",
+    "as_column",
+    "cached_jacobian",
     "hookimpl",
     "local_index",
     "stress",
-    "upright",
 ]

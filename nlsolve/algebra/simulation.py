@@ -8,7 +8,6 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
-import pandas as pd
 
 from nlsolve.algebra.colouring import Compression
 from nlsolve.contracts.linear_solver import LinearSolver
@@ -19,7 +18,7 @@ from nlsolve.contracts.rules.refresh import RefreshRule
 from nlsolve.contracts.status import SolveError, Status
 from nlsolve.contracts.system import System
 from nlsolve.flow.setup import Progress, Record, reported
-from nlsolve.results.columns import STEPS
+from nlsolve.results.frames import steps_frame
 from nlsolve.series import Array, Series
 from nlsolve.solving.driver import solve
 from nlsolve.solving.ledger import Ledger
@@ -118,7 +117,7 @@ def solve_system(
         rows[-1]["accepted"] = True
     return Record(
         summary,
-        pd.DataFrame(rows, columns=[name for name in STEPS if name != "case"]),
+        steps_frame(rows),
         problem=problem,
         state=outcome.state,
     )

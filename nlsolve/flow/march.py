@@ -18,7 +18,7 @@ from nlsolve.flow.observables import divergence, nodal_fields, velocity_error, w
 from nlsolve.flow.setup import Progress, Record, Setup, reported
 from nlsolve.flow.state import Balance
 from nlsolve.flow.validity import audit
-from nlsolve.results.columns import STEPS
+from nlsolve.results.frames import steps_frame
 from nlsolve.series import Array
 from nlsolve.solving.driver import solve
 from nlsolve.solving.ledger import Ledger
@@ -242,6 +242,5 @@ class _March:
             estimate = {"estimate": lambda: balance.error_estimate(velocity, self.before)}
             solved = status is Status.CONVERGED
             summary |= audit(self.scene, discretizer, flow, velocity, change, reached, **(estimate if solved else {}))
-        steps = pd.DataFrame(self.rows, columns=[name for name in STEPS if name != "case"])
         fields = pd.concat(self.snapshots, ignore_index=True) if self.snapshots else pd.DataFrame()
-        return Record(summary, steps, fields, flow, unknowns)
+        return Record(summary, steps_frame(self.rows), fields, flow, unknowns)
