@@ -17,6 +17,8 @@ from pydantic import ValidationError
 
 from nlsolve import SolveError, Status
 from nlsolve.plugin import Expansion, KeptTangent, NonlinearProblem, NonlinearSolver, Series, Step
+from nlsolve.results.columns import STEPS
+from nlsolve.results.frames import steps_frame
 from nlsolve.solving.driver import PATIENCE
 from nlsolve.solving.stopping import Budget, StoppingTest
 from nlsolve.testing.toy_problem import DenseLU, ToyProblem
@@ -210,6 +212,31 @@ def test_every_status_has_a_sentence_of_its_own() -> None:
     assert len(sentences) == len(Status)
     assert all(len(sentence.split()) > 4 for sentence in sentences)
     assert Status.NON_FINITE.word == "non finite"
+
+
+# Notes.
+
+
+class Noting(NonlinearSolver):
+    """Halves the state, and notes more than there are columns for."""
+
+    def steps(self, problem: NonlinearProblem, tangent: KeptTangent, start: np.ndarray) -> Iterator[Step]:
+        yield Step(start)
+        yield Step(0.5 * start, notes={"length": 0.5, "shift": 3.0, "why": "because", "residual_norm": 0.0, "step": 9})
+
+
+def test_a_note_without_a_column_is_kept_under_its_name() -> None:
+    outcome, _ = run(IDENTITY, Noting(), None, ONE)
+    row = outcome.steps[1]
+    assert (row["length"], row["note.shift"], row["note.why"]) == (0.5, 3.0, "because")
+    frame = steps_frame(outcome.steps)
+    assert list(frame.columns) == [*(name for name in STEPS if name != "case"), "note.shift", "note.why"]
+    assert frame["note.shift"].tolist()[1:] == [3.0]
+
+
+def test_a_note_does_not_take_the_place_of_what_the_driver_measured() -> None:
+    outcome, _ = run(IDENTITY, Noting(), None, ONE)
+    assert (outcome.steps[1]["step"], outcome.steps[1]["residual_norm"]) == (1, 0.5)
 
 
 # Stopping tests.
