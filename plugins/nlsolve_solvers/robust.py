@@ -51,6 +51,7 @@ class Robust(NonlinearSolver):
             for step, residual in Newton().steps_and_residuals(problem, tangent, start):
                 size = float(np.linalg.norm(residual))
                 if not size <= FAR * min([size, *least[:1]]):
+                    tangent.observe(contraction=FAR)  # the driver is not shown this step and cannot measure it
                     break
                 if least:  # the start has been shown
                     yield step
