@@ -13,24 +13,22 @@ from nlsolve.contracts.nonlinear_solver import KeptTangent, NonlinearSolver, Ste
 from nlsolve.contracts.problem import Expansion, NonlinearProblem
 from nlsolve.contracts.rules.globalization import Globalization, Search
 from nlsolve.contracts.rules.predictor import Predictor
-from nlsolve.contracts.rules.refresh import Evidence, RefreshRule
+from nlsolve.contracts.rules.refresh import RefreshRule, TangentHistory
 from nlsolve.contracts.scene import Entry, Misfit, Preparation, Scene, Section, Simulation, SingleSolve, Solve, Workload
 from nlsolve.contracts.status import SolveError, Status
 from nlsolve.flow.scene import FlowScene
 from nlsolve.registry.hookspecs import hookimpl
 from nlsolve.registry.nested import Globalized
-from nlsolve.series import Series, upright
+from nlsolve.series import NoSeries, Series, as_column
 from nlsolve.solving.anderson_mixing import Mixing
-from nlsolve.solving.cached_jacobian import AssembledOnce
+from nlsolve.solving.cached_jacobian import cached_jacobian
 
 __all__ = [
-    "AssembledOnce",
     "Cloud",
     "Component",
     "ConstitutiveLaw",
     "Discretizer",
     "Entry",
-    "Evidence",
     "Exact",
     "Expansion",
     "Factors",
@@ -41,6 +39,7 @@ __all__ = [
     "LinearSolver",
     "Misfit",
     "Mixing",
+    "NoSeries",
     "NodeMotion",
     "NonlinearProblem",
     "NonlinearSolver",
@@ -63,10 +62,12 @@ __all__ = [
     "Status",
     "Step",
     "System",
+    "TangentHistory",
     "TimeSteps",
     "Workload",
+    "as_column",
+    "cached_jacobian",
     "hookimpl",
     "local_index",
     "stress",
-    "upright",
 ]

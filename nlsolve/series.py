@@ -9,7 +9,7 @@ operations; p orders of a whole formula therefore cost O(p²). Write a formula o
     a pushed `Series`   its Taylor coefficients along a path x(a).
 
 Recurrences: Griewank & Walther, Evaluating Derivatives (2008), table 13.2. What is not analytic (absolute value,
-comparison, choice by condition) has no Taylor coefficients and raises TypeError.
+comparison, choice by condition) has no Taylor coefficients and raises NoSeries.
 """
 
 from __future__ import annotations
@@ -24,6 +24,10 @@ from numpy.typing import ArrayLike, NDArray
 
 Array = NDArray[np.float64]
 FIRST_CAPACITY = 24  # coefficients packed arrays have room for at first; doubled whenever they are full
+
+
+class NoSeries(TypeError):
+    """A formula that has no Taylor coefficients, or is not written so that a `Series` can find them."""
 
 
 class Series:
@@ -162,7 +166,7 @@ class Series:
 
     def __pow__(self, exponent: Any) -> Series:
         if not isinstance(exponent, Number):
-            raise TypeError("a series can be raised to a constant power only; write exp(y log x) for a varying one")
+            raise NoSeries("a series can be raised to a constant power only; write exp(y log x) for a varying one")
         power = float(exponent)  # type: ignore[arg-type]
         if power.is_integer() and power >= 1.0:  # by products, which are analytic at zero too
             half = self if power < 4.0 else self ** (power // 2.0)
@@ -175,7 +179,7 @@ class Series:
     # What has no Taylor coefficients.
 
     def _refuse(self, *_: Any) -> NoReturn:
-        raise TypeError(
+        raise NoSeries(
             "absolute value, comparison and choice by condition are not analytic, so they have no Taylor coefficients: "
             "write the formula with +, -, *, /, powers, exp, log, sqrt, sin, cos, atan2, sinh, cosh, tanh and asinh"
         )
@@ -197,7 +201,7 @@ class Series:
         return formula(*inputs, **options)
 
 
-def upright(values: ArrayLike, u: Array | Series) -> Array:
+def as_column(values: ArrayLike, u: Array | Series) -> Array:
     """Constants (U,) as (U, 1, …), to stand beside a u of shape (U, …) in a formula that acts along the first axis."""
     constants = _constant(values)
     return constants.reshape(-1, *[1] * (len(u.shape) - 1))

@@ -17,7 +17,6 @@ from nlsolve.plugin import (
     Component,
     ConstitutiveLaw,
     Discretizer,
-    Evidence,
     Factors,
     LinearSolver,
     NonlinearSolver,
@@ -27,6 +26,7 @@ from nlsolve.plugin import (
     RefreshRule,
     Scene,
     Step,
+    TangentHistory,
     hookimpl,
 )
 from nlsolve.registry.registry import Registry
@@ -136,7 +136,7 @@ class EveryIteration(RefreshRule):
 
     kind: Literal["every-iteration"] = "every-iteration"
 
-    def due(self, evidence: Evidence) -> bool:
+    def due(self, history: TangentHistory) -> bool:
         return True
 
 
@@ -146,8 +146,8 @@ class EveryM(RefreshRule):
     kind: Literal["every-m"] = "every-m"
     m: int = Field(5, gt=0, description="uses")
 
-    def due(self, evidence: Evidence) -> bool:
-        return evidence.uses >= self.m
+    def due(self, history: TangentHistory) -> bool:
+        return history.uses >= self.m
 
 
 class Previous(Predictor):

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from nlsolve import series
-from nlsolve.plugin import Series, upright
+from nlsolve.plugin import Series, as_column
 from nlsolve.series import Array
 
 ORDER = 30
@@ -163,7 +163,7 @@ def test_a_formula_on_parts_sums_to_its_value() -> None:
     def f(u: Any) -> Any:
         x, y, z = u
         angle = np.arctan2(-x, y) * np.sum(u, axis=0)
-        rest = np.cumsum(u * upright([1.0, 2.0, 3.0], u), axis=0)[1:] * z
+        rest = np.cumsum(u * as_column([1.0, 2.0, 3.0], u), axis=0)[1:] * z
         return np.concatenate([np.stack([angle]), rest])
 
     u = Series(np.array([[1.3, -0.4], [2.0, 1.0], [0.5, -1.5]]))
@@ -181,9 +181,9 @@ def test_columns_of_seeds_are_columns_of_the_jacobian() -> None:
     np.testing.assert_array_equal(np.stack([x * y, x + y**3]).coefficient(1), [[2.0, 1.0], [1.0, 12.0]])
 
 
-def test_upright_constants_stand_beside_columns() -> None:
-    assert upright([1.0, 2.0], np.zeros(2)).shape == (2,)
-    assert upright([1.0, 2.0], Series(np.zeros((2, 5)))).shape == (2, 1)
+def test_constants_as_a_column_stand_beside_columns() -> None:
+    assert as_column([1.0, 2.0], np.zeros(2)).shape == (2,)
+    assert as_column([1.0, 2.0], Series(np.zeros((2, 5)))).shape == (2, 1)
 
 
 # Algebra, for any positive series.

@@ -45,7 +45,7 @@ class System(Scene, ABC):
     @abstractmethod
     def formula(self, u: Any) -> Any:
         """F(u), (U, …) -> (U, …), analytic: of +, −, *, /, powers, indexing, slices, matrices from the left, np.stack,
-        np.concatenate, np.sum and np.cumsum along axis 0, exp, log, sin, …; constants (U,) stand `upright` beside u.
+        np.concatenate, np.sum and np.cumsum along axis 0, exp, log, sin, …; constants (U,) `as_column` beside u.
         """
 
     @abstractmethod

@@ -42,22 +42,39 @@ class Expansion:
 
 
 class NonlinearProblem(ABC):
-    """R(u) = 0 for u of shape (U,)."""
+    """R(u) = 0 for u of shape (U,).
+
+    `residual` is all that a problem must have. Methods that factorise or multiply need `jacobian`, those that work with
+    Taylor series `expand`, Picard's iteration `secant`; on a problem without them they end as "not applicable".
+    """
 
     is_gradient: bool = False
     """True when R is the gradient of a convex potential, so that R(u + t w)·w grows with t for every direction w."""
+
+    @property
+    def has_series(self) -> bool:
+        """True when the problem gives an expansion of R, as it does once its class defines `expand`."""
+        return type(self).expand is not NonlinearProblem.expand
 
     @abstractmethod
     def residual(self, u: Array) -> Array:
         """R(u), shape (U,)."""
 
-    @abstractmethod
     def jacobian(self, u: Array) -> Any:
-        """J = ∂R/∂u, a sparse (U, U) matrix."""
+        """J = ∂R/∂u, a sparse (U, U) matrix. SolveError (not applicable) from a problem without one."""
+        raise SolveError(
+            Status.NOT_APPLICABLE,
+            f"{type(self).__name__} has no Jacobian: define its method `jacobian`, or choose a method that needs its "
+            "residual only, such as scipy-root with precondition = false",
+        )
 
-    @abstractmethod
     def expand(self, u: Array) -> Expansion:
-        """The expansion of R around u."""
+        """The expansion of R around u. SolveError (not applicable) from a problem without one."""
+        raise SolveError(
+            Status.NOT_APPLICABLE,
+            f"{type(self).__name__} has no Taylor series of its residual: write the residual as one formula and run it "
+            "on a Series in a method `expand`, or choose a method that needs no series, such as newton or anderson",
+        )
 
     def secant(self, u: Array) -> Any:
         """A(u) with R(u) = A(u) u + c(u), a sparse (U, U) matrix, of a problem that is linear but for its coefficients.

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from typing import Any
+
 REPORTED: dict[str, str] = {
     "reported_iterations": "iterations that the library behind a method says it took",
     "reported_residuals": "residuals that it says it evaluated",
@@ -137,7 +140,17 @@ STEPS: dict[str, str] = {
     "probe_u": "velocity of the probe node, x [mm/s]",
     "probe_v": "the same, y [mm/s]",
 }
-"""`steps`: a row an iteration or series, in order. A column that does not apply to a method or scene holds NaN."""
+"""`steps`: a row an iteration or series, in order. A column that does not apply to a method or scene holds NaN. Behind
+these stand the notes of a method for which there is no column, as "note.<name>".
+"""
+
+NOTE = "note."
+
+
+def step_columns(notes: Mapping[str, Any]) -> dict[str, Any]:
+    """What a method notes of a step, by columns of `steps`: those described there, or "note.<name>"."""
+    return {name if name in STEPS else f"{NOTE}{name}": value for name, value in notes.items()}
+
 
 FIELDS: dict[str, str] = {
     "case": "identity of the case",

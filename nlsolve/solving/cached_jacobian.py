@@ -2,28 +2,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
-from nlsolve.contracts.problem import Expansion, NonlinearProblem
+from nlsolve.contracts.problem import NonlinearProblem
 from nlsolve.series import Array
 
 
-class AssembledOnce(NonlinearProblem):
-    """R(u) = 0 with the last Jacobian remembered: what K* is made of serves the products too."""
+def cached_jacobian(problem: NonlinearProblem) -> Callable[[Array], Any]:
+    """u ↦ J(u), which keeps the last J: for a method that factorises it into K* and multiplies with it too."""
+    last: tuple[Array, Any] | None = None
 
-    def __init__(self, problem: NonlinearProblem) -> None:
-        self._problem = problem
-        self._last: tuple[Array, Any] | None = None
+    def jacobian(u: Array) -> Any:
+        nonlocal last
+        if last is None or not np.array_equal(last[0], u):
+            last = u.copy(), problem.jacobian(u)
+        return last[1]
 
-    def residual(self, u: Array) -> Array:
-        return self._problem.residual(u)
-
-    def jacobian(self, u: Array) -> Any:
-        if self._last is None or not np.array_equal(self._last[0], u):
-            self._last = u.copy(), self._problem.jacobian(u)
-        return self._last[1]
-
-    def expand(self, u: Array) -> Expansion:
-        return self._problem.expand(u)
+    return jacobian

@@ -11,8 +11,10 @@ from nlsolve.contracts.nonlinear_solver import NonlinearSolver
 from nlsolve.contracts.outcome import Outcome
 from nlsolve.contracts.problem import NonlinearProblem
 from nlsolve.contracts.status import SolveError, Status
+from nlsolve.results.columns import step_columns
 from nlsolve.series import Array
-from nlsolve.solving.ledger import Audited, Ledger
+from nlsolve.solving.counted_problem import CountedProblem
+from nlsolve.solving.ledger import Ledger
 from nlsolve.solving.stopping import Budget, StoppingTest
 from nlsolve.solving.tangent import Tangent
 
@@ -30,17 +32,20 @@ def solve(
     budget: Budget,
     ledger: Ledger,
 ) -> Outcome:
-    """Take steps of `solver` on `problem` from `start` until the stopping test, the budget or a failure ends it."""
-    audited = Audited(problem, ledger)
-    scale = audited.scale(start)
+    """Take steps of `solver` on `problem` from `start` until the stopping test, the budget or a failure ends it.
+
+    After every step ‖R_new‖/‖R_old‖ is measured here, for the table of steps and for the refresh rule of `tangent`.
+    """
+    counted = CountedProblem(problem, ledger)
+    scale = counted.uncounted_scale(start)
     before, rows = start, list[dict[str, Any]]()
-    residual_norm = np.inf
+    residual_norm = size = np.inf
     claimed = denied = False
 
     def ended(status: Status, detail: str = "") -> Outcome:
         blame: Mapping[str, float] = {}
         if status is not Status.CONVERGED and np.isfinite(before).all():
-            blame = problem.blame(before, audited.residual(before))
+            blame = problem.blame(before, counted.uncounted_residual(before))
         sentence = detail or status.sentence
         return Outcome(status, sentence, before, float(residual_norm), tuple(rows), claimed, denied, blame)
 
@@ -48,7 +53,7 @@ def solve(
         return ended(
             Status.NON_FINITE, "the forces at the first state are not finite: the law gave no finite viscosity"
         )
-    iterator = iter(solver.steps(audited.view, tangent.view, start))
+    iterator = iter(solver.steps(counted, tangent, start))
     first = best = np.inf
     since_best = 0
     for number in range(budget.iterations + 1):
@@ -60,20 +65,22 @@ def solve(
             return ended(error.status, error.detail)
         if step is None:
             return ended(Status.STAGNATED, "the method stopped by itself before the stopping test was met")
-        residual_norm = float(np.linalg.norm(audited.residual(step.state))) / scale
+        size_before, size = size, float(np.linalg.norm(counted.uncounted_residual(step.state)))
+        residual_norm = size / scale
+        contraction = (size / size_before if size_before else 0.0) if number else None
+        tangent.step_taken(contraction)
         difference = stop.difference(step.state, before) if number else np.nan
         before = step.state.copy()  # a method may go on working in its array
-        rows.append(
-            {
-                "step": number,
-                "branch": tangent.branches,
-                "triangular_solves": ledger.counts["triangular_solve"],
-                "residual_norm": residual_norm,
-                "difference": difference,
-                "seconds": ledger.seconds["method"],
-                **step.notes,
-            }
-        )
+        measured = {
+            "step": number,
+            "branch": tangent.branches,
+            "triangular_solves": ledger.counts["triangular_solve"],
+            "residual_norm": residual_norm,
+            "difference": difference,
+            "seconds": ledger.seconds["method"],
+        }
+        contraction_column = {"contraction": np.nan if contraction is None else contraction}
+        rows.append(measured | contraction_column | step_columns(step.notes) | measured)
         solved = residual_norm <= stop.verified
         claimed |= step.claim is True and not solved
         denied |= step.claim is False and solved

@@ -17,7 +17,8 @@ from nlsolve.contracts.problem import NonlinearProblem
 from nlsolve.contracts.rules.refresh import RefreshRule
 from nlsolve.contracts.scene import Scene, Solve
 from nlsolve.contracts.status import SolveError, Status
-from nlsolve.results.columns import REPORTED, STEPS
+from nlsolve.results.columns import REPORTED
+from nlsolve.results.frames import steps_frame
 from nlsolve.series import Array
 from nlsolve.solving.driver import solve
 from nlsolve.solving.ledger import Ledger
@@ -97,9 +98,8 @@ class _Run:
     def record(self) -> Record:
         outcome = self.outcome()
         summary = self.summary(outcome)
-        steps = pd.DataFrame(self.rows, columns=[name for name in STEPS if name != "case"])
         problem, state = self.kept or (None, None)
-        return Record(summary, steps, self.simulation.fields(), problem, state)
+        return Record(summary, steps_frame(self.rows), self.simulation.fields(), problem, state)
 
     def outcome(self) -> Outcome:
         """Solve the problems of the simulation one after the other; how the case ended."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from nlsolve.contracts.problem import NonlinearProblem
@@ -10,7 +12,9 @@ from nlsolve.testing.promises import ORDER, PARTS, check_coefficients, norm, req
 
 
 def check_problem(problem: NonlinearProblem, u: Array, tolerance: float = 1e-6) -> None:
-    """J d against central differences of R along random d, to `tolerance`; R_j along a path against R on that path."""
+    """J d against central differences of R along random d, to `tolerance`; R_j along a path against R on that path, of
+    a problem that has a series.
+    """
     random = np.random.default_rng(0)
     size = norm(u) / np.sqrt(len(u)) or 1.0
     jacobian = problem.jacobian(u)
@@ -20,6 +24,12 @@ def check_problem(problem: NonlinearProblem, u: Array, tolerance: float = 1e-6) 
         steps = [(problem.residual(u + h * d) - problem.residual(u - h * d)) / (2.0 * h) for h in PARTS]
         off = min(norm(product - difference) for difference in steps) / norm(product)
         require(off <= tolerance, f"the Jacobian is off by {off:.1e} from central differences, allowed {tolerance:g}")
+    if problem.has_series:
+        _check_series(problem, u, jacobian, size, random)
+
+
+def _check_series(problem: NonlinearProblem, u: Array, jacobian: Any, size: float, random: np.random.Generator) -> None:
+    """R_j and Q_j along a random path that begins with u."""
     expansion = problem.expand(u)
     path = Series(u)
     for j in range(1, ORDER + 1):

@@ -6,20 +6,20 @@ import numpy as np
 
 from nlsolve.contracts.rules.globalization import Globalization
 from nlsolve.contracts.rules.predictor import Predictor
-from nlsolve.contracts.rules.refresh import Evidence, RefreshRule
+from nlsolve.contracts.rules.refresh import RefreshRule, TangentHistory
 from nlsolve.testing.promises import norm, require, same
-from nlsolve.testing.toy_problem import SmallProblem
+from nlsolve.testing.toy_problem import ToyProblem
 
 
 def check_globalization(globalization: Globalization) -> None:
-    """On a small problem with a potential: a positive length, the residual of the state it leads to, nothing changed in
+    """On a toy problem with a potential: a positive length, the residual of the state it leads to, nothing changed in
     what was handed over; near the solution Newton's full step; no memory from one solve to the next.
     """
-    problem = SmallProblem()
+    problem = ToyProblem()
     problem.is_gradient = True  # A is symmetric
 
     def first(far: float) -> float:
-        state = SmallProblem.solution + far * np.cos(np.arange(12.0))
+        state = ToyProblem.solution + far * np.cos(np.arange(12.0))
         residual = problem.residual(state)
         direction = -np.linalg.solve(problem.jacobian(state).toarray(), residual)
         given = [state.copy(), residual.copy(), direction.copy()]
@@ -52,9 +52,9 @@ def check_predictor(predictor: Predictor) -> None:
 
 
 def check_refresh_rule(rule: RefreshRule) -> None:
-    """A plain answer to any evidence, the same each time, be it not yet observed (None) or not a number."""
+    """A plain answer to any history, the same each time, also to what has not been observed (None) or is no number."""
     for seen in (None, 0.0, 0.5, 1.0, 1e9, np.nan):
-        for evidence in (Evidence(1, seen), Evidence(1, None, seen), Evidence(99, seen, seen)):
-            first, again = rule.due(evidence), rule.due(evidence)
-            require(isinstance(first, (bool, np.bool_)), f"due({evidence}) is {first!r}, not True or False")
-            require(first == again, f"due({evidence}) changed its mind: a rule may look at the evidence only")
+        for history in (TangentHistory(1, seen), TangentHistory(1, None, seen), TangentHistory(99, seen, seen)):
+            first, again = rule.due(history), rule.due(history)
+            require(isinstance(first, (bool, np.bool_)), f"due({history}) is {first!r}, not True or False")
+            require(first == again, f"due({history}) changed its mind: a rule may look at the history only")

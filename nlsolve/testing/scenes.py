@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from nlsolve.algebra.system import System
-from nlsolve.contracts.continuum.law import ConstitutiveLaw
 from nlsolve.contracts.continuum.geometry import Geometry
+from nlsolve.contracts.continuum.law import ConstitutiveLaw
 from nlsolve.contracts.continuum.terms import NodeMotion, Physics
 from nlsolve.series import Series
 from nlsolve.testing.problems import check_problem

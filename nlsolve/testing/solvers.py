@@ -16,16 +16,18 @@ from nlsolve.solving.ledger import Ledger
 from nlsolve.solving.stopping import Budget, StoppingTest
 from nlsolve.solving.tangent import Tangent
 from nlsolve.testing.promises import require, same
-from nlsolve.testing.toy_problem import DenseLU, SmallProblem
+from nlsolve.testing.toy_problem import DenseLU, ToyProblem
 
 
 def check_solver(solver: NonlinearSolver, rule: RefreshRule | None = None) -> None:
-    """The start comes first and is left as it was, like every state after it; a small problem is solved to 1e-10 under
+    """The start comes first and is left as it was, like every state after it; a toy problem is solved to 1e-10 under
     the driver; what linear solver and problem were asked for is in the ledger.
+
+    rule : the refresh rule of K*; without one K* is renewed at every iteration.
     """
-    problem, ledger, asked_before = SmallProblem(), Ledger(), DenseLU.asked.copy()
+    problem, ledger, asked_before = ToyProblem(), Ledger(), DenseLU.asked.copy()
     tangent = Tangent(DenseLU(), rule, ledger)
-    start = SmallProblem.solution + 0.5 * np.cos(np.arange(12.0))
+    start = ToyProblem.solution + 0.5 * np.cos(np.arange(12.0))
     kept = start.copy()
     seen: list[tuple[Array, Array]] = []
 
@@ -36,8 +38,11 @@ def check_solver(solver: NonlinearSolver, rule: RefreshRule | None = None) -> No
                 yield step
 
     outcome = solve(problem, Watched(), tangent, start, StoppingTest(tolerance=1e-11), Budget(), ledger)
-    require(outcome.status is Status.CONVERGED, f"a small convex problem was not solved: {outcome.detail}")
-    same(outcome.state, SmallProblem.solution, 1.0, "the solution of the small problem")
+    require(
+        outcome.status is Status.CONVERGED,
+        f"the toy problem was not solved: {outcome.detail}",
+    )
+    same(outcome.state, ToyProblem.solution, 1.0, "the solution of the toy problem")
     require(np.array_equal(seen[0][1], kept), "the first state yielded must be the start itself")
     require(np.array_equal(start, kept), "the method changed the array it was given as its start")
     require(all(np.array_equal(a, b) for a, b in seen), "the method changed a state after it had yielded it")

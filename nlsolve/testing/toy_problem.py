@@ -33,7 +33,7 @@ class _DenseFactors(Factors):
         return scipy.linalg.lu_solve(self._lu, rhs)
 
 
-class SmallProblem(NonlinearProblem):
+class ToyProblem(NonlinearProblem):
     """A u + sinh u = A u* + sinh u*, tridiagonal A: one solution u*, `solution`, which any method should find."""
 
     solution = np.sin(np.arange(1.0, 13.0))

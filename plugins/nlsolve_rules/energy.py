@@ -43,7 +43,7 @@ class LeastEnergy:
         state: np.ndarray,
         residual: np.ndarray,
         direction: np.ndarray,
-        promised: float = 1.0,
+        predicted_decrease: float = 1.0,
     ) -> tuple[float, np.ndarray]:
         """The slope is bracketed once a trial lies behind its zero."""
         before, low = float(residual @ direction), 0.0

@@ -28,7 +28,7 @@ class Full:
         state: np.ndarray,
         residual: np.ndarray,
         direction: np.ndarray,
-        promised: float = 1.0,
+        predicted_decrease: float = 1.0,
     ) -> tuple[float, np.ndarray]:
         """1 and R(u + w)."""
         return 1.0, problem.residual(state + direction)

@@ -11,7 +11,7 @@ from pydantic import Field
 
 from nlsolve.plugin import Globalization, NonlinearProblem, Search
 
-SUFFICIENT_DECREASE = 1e-4  # of ‖R‖, as part of what is promised per unit of step length (Armijo 1966)
+SUFFICIENT_DECREASE = 1e-4  # of ‖R‖, as part of the decrease predicted per unit of step length (Armijo 1966)
 OVER = 1e30  # a ratio of residuals above this counts as this: its fourth power is still a number
 SHORTEST, LONGEST = 0.1, 0.5  # the next length over the last one (Dennis & Schnabel 1983, A6.3.1)
 
@@ -64,7 +64,7 @@ class LeastResidual:
         state: np.ndarray,
         residual: np.ndarray,
         direction: np.ndarray,
-        promised: float = 1.0,
+        predicted_decrease: float = 1.0,
     ) -> tuple[float, np.ndarray]:
         """The first t with enough decrease, else the best of those tried."""
         size = float(np.linalg.norm(residual))
@@ -76,24 +76,24 @@ class LeastResidual:
             trial_size = float(np.linalg.norm(trial))
             if trial_size < best_size or not np.isfinite(best_size):
                 best_length, best_size, best = length, trial_size, trial
-            if not size or trial_size <= (1.0 - SUFFICIENT_DECREASE * length * promised) * max(self._sizes):
+            if not size or trial_size <= (1.0 - SUFFICIENT_DECREASE * length * predicted_decrease) * max(self._sizes):
                 break
             tried.append((length, min(trial_size / size, OVER)))
-            length = self._shorter(tried, promised)
+            length = self._shorter(tried, predicted_decrease)
         return best_length, best
 
 
-def halved(tried: Trials, promised: float) -> float:
+def halved(tried: Trials, predicted_decrease: float) -> float:
     """t/2."""
     return 0.5 * tried[-1][0]
 
 
-def interpolated(tried: Trials, promised: float) -> float:
+def interpolated(tried: Trials, predicted_decrease: float) -> float:
     """The least point of φ(t) = ‖R(u + t w)‖²/‖R(u)‖², with φ(0) = 1, φ′(0) = −2 (1 − η) and the last values of φ: of a
     parabola after the first trial, of a cubic after that; within [0.1, 0.5] of the last t (Dennis & Schnabel 1983).
     """
     t, ratio = tried[-1]
-    slope = -2.0 * promised
+    slope = -2.0 * predicted_decrease
     over = (ratio**2 - 1.0 - slope * t) / t**2  # of φ over its tangent at 0, over t²: c + d t
     if len(tried) == 1:
         least = -slope / (2.0 * over)

@@ -7,7 +7,7 @@ from typing import Literal
 import numpy as np
 from pydantic import Field
 
-from nlsolve.plugin import Evidence, RefreshRule
+from nlsolve.plugin import RefreshRule, TangentHistory
 
 
 class EveryIteration(RefreshRule):
@@ -15,7 +15,7 @@ class EveryIteration(RefreshRule):
 
     kind: Literal["every-iteration"] = "every-iteration"
 
-    def due(self, evidence: Evidence) -> bool:
+    def due(self, history: TangentHistory) -> bool:
         """Always."""
         return True
 
@@ -26,9 +26,9 @@ class EveryM(RefreshRule):
     kind: Literal["every-m"] = "every-m"
     m: int = Field(5, gt=0, description="iterations or series a tangent serves")
 
-    def due(self, evidence: Evidence) -> bool:
+    def due(self, history: TangentHistory) -> bool:
         """uses ≥ m."""
-        return evidence.uses >= self.m
+        return history.uses >= self.m
 
 
 class PoorContraction(RefreshRule):
@@ -37,9 +37,9 @@ class PoorContraction(RefreshRule):
     kind: Literal["poor-contraction"] = "poor-contraction"
     limit: float = Field(0.5, gt=0, description="largest ‖R_new‖/‖R_old‖ with which a tangent is kept")
 
-    def due(self, evidence: Evidence) -> bool:
+    def due(self, history: TangentHistory) -> bool:
         """contraction > limit."""
-        return evidence.contraction is not None and not evidence.contraction <= self.limit
+        return history.contraction is not None and not history.contraction <= self.limit
 
 
 class CostOptimal(RefreshRule):
@@ -55,13 +55,13 @@ class CostOptimal(RefreshRule):
     digits: float = Field(20.0, gt=0, description="d, by a tangent: digits an increment gains, times increments ahead")
     fresh: float = Field(0.1, gt=0, lt=1, description="θ_new, contraction expected of a new tangent")
 
-    def due(self, evidence: Evidence) -> bool:
+    def due(self, history: TangentHistory) -> bool:
         """Iterations left at θ > ratio + iterations left at θ_new; always when θ ≥ 1."""
-        if evidence.contraction is None or evidence.contraction == 0.0:
+        if history.contraction is None or history.contraction == 0.0:
             return False
-        if not evidence.contraction < 1.0:
+        if not history.contraction < 1.0:
             return True
-        left, left_new = (self.digits / -np.log10(theta) for theta in (evidence.contraction, self.fresh))
+        left, left_new = (self.digits / -np.log10(theta) for theta in (history.contraction, self.fresh))
         return bool(left > self.ratio + left_new)
 
 
@@ -78,13 +78,13 @@ class AverageCost(RefreshRule):
     kind: Literal["average-cost"] = "average-cost"
     ratio: float = Field(40.0, ge=0, description="cost of a new tangent over that of an iteration: factor_solve_ratio")
 
-    def due(self, evidence: Evidence) -> bool:
+    def due(self, history: TangentHistory) -> bool:
         """Cost of a digit now > average cost of the digits so far; always when the last step gained nothing."""
-        if evidence.contraction is None or evidence.rate is None:
+        if history.contraction is None or history.rate is None:
             return False
-        if not evidence.contraction < 1.0:
+        if not history.contraction < 1.0:
             return True
-        return not evidence.digits <= evidence.rate * (self.ratio + evidence.solves)
+        return not history.digits <= history.rate * (self.ratio + history.solves)
 
 
 class RangeUnderOne(RefreshRule):
@@ -92,9 +92,9 @@ class RangeUnderOne(RefreshRule):
 
     kind: Literal["range-under-one"] = "range-under-one"
 
-    def due(self, evidence: Evidence) -> bool:
+    def due(self, history: TangentHistory) -> bool:
         """a_max < 1."""
-        return evidence.range is not None and not evidence.range >= 1.0
+        return history.range is not None and not history.range >= 1.0
 
 
 class Never(RefreshRule):
@@ -102,6 +102,6 @@ class Never(RefreshRule):
 
     kind: Literal["never"] = "never"
 
-    def due(self, evidence: Evidence) -> bool:
+    def due(self, history: TangentHistory) -> bool:
         """Not once."""
         return False

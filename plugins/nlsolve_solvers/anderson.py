@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import ClassVar, Literal
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 from pydantic import Field
@@ -25,25 +25,22 @@ class Anderson(NonlinearSolver):
     )
     default_refresh: ClassVar = {"kind": "poor-contraction"}
 
-    def linearized(self, problem: NonlinearProblem) -> NonlinearProblem:
-        """The problem whose Jacobian is factorised into K*."""
-        return problem
+    def matrix(self, problem: NonlinearProblem, state: np.ndarray) -> Any:
+        """What is factorised into K*."""
+        return problem.jacobian(state)
 
     def steps(self, problem: NonlinearProblem, tangent: KeptTangent, start: np.ndarray) -> Iterator[Step]:
         """The iterates u_0, u_1, …"""
-        state, kept, linearized = start, False, self.linearized(problem)
+        state, kept = start, False
         residual, search = problem.residual(state), self.globalization.search(problem)
         mixing = Mixing(self.depth, self.damping)
         yield Step(state)
         while True:
-            size = float(np.linalg.norm(residual))
-            renewed = tangent.refresh_if_due(linearized, state)
+            renewed = tangent.refresh_if_due(lambda: self.matrix(problem, state))
             if renewed and kept:
                 mixing.forget()
             kept = not renewed
             direction = mixing.next(state, -tangent.solve(residual)) - state
             length, residual = search.length(problem, state, residual, direction)
             state = state + length * direction
-            contraction = float(np.linalg.norm(residual)) / size if size else 0.0
-            tangent.observe(contraction=contraction)
-            yield Step(state, notes={"length": length, "contraction": contraction})
+            yield Step(state, notes={"length": length})

@@ -36,8 +36,7 @@ class Broyden(NonlinearSolver):
         residual, search = problem.residual(state), self.globalization.search(problem)
         yield Step(state)
         while True:
-            size = float(np.linalg.norm(residual))
-            if tangent.refresh_if_due(problem, state) or updates.count == self.memory:
+            if tangent.refresh_if_due(lambda: problem.jacobian(state)) or updates.count == self.memory:
                 updates = Updates()
             plain = -tangent.solve(residual)
             direction = updates.next(plain)
@@ -46,9 +45,7 @@ class Broyden(NonlinearSolver):
             length, residual = search.length(problem, state, residual, direction)
             updates.took(length * direction, length)
             state = state + length * direction
-            contraction = float(np.linalg.norm(residual)) / size if size else 0.0
-            tangent.observe(contraction=contraction)
-            yield Step(state, notes={"length": length, "contraction": contraction})
+            yield Step(state, notes={"length": length})
 
 
 class Updates:

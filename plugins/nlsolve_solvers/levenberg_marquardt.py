@@ -6,9 +6,11 @@ from collections.abc import Iterator
 from typing import Any, Literal
 
 import numpy as np
+import scipy.sparse as sp
 from pydantic import Field
+from scipy.sparse.linalg import norm
 
-from nlsolve.plugin import Expansion, KeptTangent, NonlinearProblem, NonlinearSolver, SolveError, Status, Step
+from nlsolve.plugin import KeptTangent, NonlinearProblem, NonlinearSolver, SolveError, Status, Step
 
 ACCEPTED = 1e-4  # gain over the one predicted from which a step is taken
 LARGEST_SHIFT = 1e12  # μ: shorter steps are lost in the rounding of u
@@ -35,7 +37,7 @@ class LevenbergMarquardt(NonlinearSolver):
         yield Step(state)
         while True:
             size = float(np.linalg.norm(residual))
-            renewed = tangent.refresh_if_due(Augmented(problem, shift), state)
+            renewed = tangent.refresh_if_due(lambda: augmented(problem.jacobian(state), shift))
             if refused and (shift > LARGEST_SHIFT or not renewed):
                 why = f"with a damping of {shift:.1e}" if renewed else "and the refresh rule keeps its matrix"
                 raise SolveError(Status.STAGNATED, f"a step was refused because ‖R‖ does not fall, {why}")
@@ -45,28 +47,24 @@ class LevenbergMarquardt(NonlinearSolver):
             trial_size, predicted = float(np.linalg.norm(trial)), size**2 - float(left @ left)
             gain = (size**2 - trial_size**2) / predicted if predicted > 0.0 else float(size == 0.0)
             refused = not gain > ACCEPTED
-            contraction = trial_size / size if size else 0.0
-            tangent.observe(contraction=max(contraction, 1.0) if refused else contraction)
             if refused:
+                tangent.observe(contraction=max(trial_size / size, 1.0))
                 if renewed:  # else its model may be at fault, which is an older J's
                     shift, growth = shift * growth, 2.0 * growth
                 continue
             shift, growth = shift * max(1.0 / 3.0, 1.0 - (2.0 * gain - 1.0) ** 3), 2.0
             state, residual = state + step, trial
-            yield Step(state, notes={"contraction": contraction})
+            yield Step(state)
 
 
-class Augmented(NonlinearProblem):
-    """R(u) = 0 as the kept tangent shall see it: (I, J; Jᵀ, −μ D)."""
+def augmented(jacobian: Any, shift: float) -> Any:
+    """(I, J; Jᵀ/α, −μ D/α) of shape (2 U, 2 U) with D = diag(‖J e_j‖²), α = min_j ‖J e_j‖.
 
-    def __init__(self, problem: NonlinearProblem, shift: float) -> None:
-        self._problem, self._shift = problem, shift
-
-    def residual(self, u: np.ndarray) -> np.ndarray:
-        return self._problem.residual(u)
-
-    def jacobian(self, u: np.ndarray) -> Any:
-        return self._problem.jacobian(u).augmented(self._shift)
-
-    def expand(self, u: np.ndarray) -> Expansion:
-        return self._problem.expand(u)
+    (I, J; Jᵀ/α, −μ D/α) (r; w) = (b; 0) has w = argmin ‖b − J w‖² + μ ‖D^½ w‖² and r = b − J w: the normal equations
+    without JᵀJ, whose condition is the square of J's (Björck 1996, 1.6). α makes rows of one size.
+    """
+    matrix = jacobian.tocsr()
+    columns = norm(matrix, axis=0)
+    alpha = float(columns.min()) or 1.0
+    rows = [[sp.eye_array(matrix.shape[0]), matrix], [matrix.T / alpha, -sp.diags_array(shift * columns**2 / alpha)]]
+    return sp.block_array(rows, format="csr")

@@ -12,10 +12,7 @@ from nlsolve.plugin import Globalized, KeptTangent, NonlinearProblem, NonlinearS
 
 
 class Newton(NonlinearSolver):
-    """K* w = −R(u),  u ← u + t w,  the length t from a globalisation.
-
-    The refresh rule is told what the step left of the residual.
-    """
+    """K* w = −R(u),  u ← u + t w,  the length t from a globalisation."""
 
     kind: Literal["newton"] = "newton"
     globalization: Globalized = Field(  # type: ignore[assignment]
@@ -24,16 +21,19 @@ class Newton(NonlinearSolver):
 
     def steps(self, problem: NonlinearProblem, tangent: KeptTangent, start: np.ndarray) -> Iterator[Step]:
         """The iterates u_0, u_1, …"""
+        for step, _ in self.steps_and_residuals(problem, tangent, start):
+            yield step
+
+    def steps_and_residuals(
+        self, problem: NonlinearProblem, tangent: KeptTangent, start: np.ndarray
+    ) -> Iterator[tuple[Step, np.ndarray]]:
+        """The iterates with R(u_0), R(u_1), …, for a method that judges them."""
         search = self.globalization.search(problem)
-        state = start
-        residual = problem.residual(state)
-        yield Step(state)
+        state, residual = start, problem.residual(start)
+        yield Step(state), residual
         while True:
-            size = float(np.linalg.norm(residual))
-            tangent.refresh_if_due(problem, state)
+            tangent.refresh_if_due(lambda: problem.jacobian(state))
             direction = -tangent.solve(residual)
             length, residual = search.length(problem, state, residual, direction)
             state = state + length * direction
-            contraction = float(np.linalg.norm(residual)) / size if size else 0.0
-            tangent.observe(contraction=contraction)
-            yield Step(state, notes={"length": length, "contraction": contraction})
+            yield Step(state, notes={"length": length}), residual

@@ -7,7 +7,7 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 from pydantic import Field
 
-from nlsolve.plugin import Expansion, NonlinearProblem
+from nlsolve.plugin import NonlinearProblem
 from nlsolve_solvers.anderson import Anderson
 
 
@@ -22,22 +22,6 @@ class Picard(Anderson):
     damping: float = Field(1.0, gt=0, lt=2, description="β, relaxation of the correction")
     default_refresh: ClassVar = {"kind": "every-iteration"}
 
-    def linearized(self, problem: NonlinearProblem) -> NonlinearProblem:
-        """The problem with A in the place of its Jacobian."""
-        return Secant(problem)
-
-
-class Secant(NonlinearProblem):
-    """R(u) = 0 as a kept tangent shall see it for Picard: J is A."""
-
-    def __init__(self, problem: NonlinearProblem) -> None:
-        self._problem = problem
-
-    def residual(self, u: np.ndarray) -> np.ndarray:
-        return self._problem.residual(u)
-
-    def jacobian(self, u: np.ndarray) -> Any:
-        return self._problem.secant(u)
-
-    def expand(self, u: np.ndarray) -> Expansion:
-        return self._problem.expand(u)
+    def matrix(self, problem: NonlinearProblem, state: np.ndarray) -> Any:
+        """A(u)."""
+        return problem.secant(state)

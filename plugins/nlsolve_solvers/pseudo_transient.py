@@ -6,9 +6,10 @@ from collections.abc import Iterator
 from typing import Any, Literal
 
 import numpy as np
+import scipy.sparse as sp
 from pydantic import Field
 
-from nlsolve.plugin import Expansion, KeptTangent, NonlinearProblem, NonlinearSolver, Step
+from nlsolve.plugin import KeptTangent, NonlinearProblem, NonlinearSolver, Step
 
 
 class PseudoTransient(NonlinearSolver):
@@ -28,26 +29,13 @@ class PseudoTransient(NonlinearSolver):
         yield Step(state)
         while True:
             size = float(np.linalg.norm(residual))
-            tangent.refresh_if_due(Damped(problem, shift), state)
+            tangent.refresh_if_due(lambda: damped(problem.jacobian(state), shift))
             state = state - tangent.solve(residual)
             residual = problem.residual(state)
-            contraction = float(np.linalg.norm(residual)) / size if size else 0.0
-            shift *= contraction
-            tangent.observe(contraction=contraction)
-            yield Step(state, notes={"contraction": contraction})
+            shift *= float(np.linalg.norm(residual)) / size if size else 0.0
+            yield Step(state)
 
 
-class Damped(NonlinearProblem):
-    """R(u) = 0 as the kept tangent shall see it: J + σ D."""
-
-    def __init__(self, problem: NonlinearProblem, shift: float) -> None:
-        self._problem, self._shift = problem, shift
-
-    def residual(self, u: np.ndarray) -> np.ndarray:
-        return self._problem.residual(u)
-
-    def jacobian(self, u: np.ndarray) -> Any:
-        return self._problem.jacobian(u).damped(self._shift)
-
-    def expand(self, u: np.ndarray) -> Expansion:
-        return self._problem.expand(u)
+def damped(jacobian: Any, shift: float) -> Any:
+    """J + σ D: each J_ii grows in its own direction, and cannot be cancelled."""
+    return jacobian + sp.diags_array(shift * jacobian.diagonal())

@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Generator, Iterator
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 from pydantic import Field
 
-from nlsolve.plugin import Expansion, KeptTangent, NonlinearProblem, NonlinearSolver, SolveError, Step
+from nlsolve.plugin import KeptTangent, NonlinearProblem, NonlinearSolver, SolveError, Step
 from nlsolve_solvers.newton import Newton
 from nlsolve_solvers.pseudo_transient import PseudoTransient
 
 FALL = 0.9  # ‖R‖ must fall by this within `patience` steps
-FAR = 1e3  # ‖R‖ behind a leap over that before it, and the growth that a descent is not forgiven
+FAR = 1e3  # largest growth of ‖R‖ that a leap may cause, or that Newton's steps may show before they are given up
 HALVINGS = 30  # of a leap: what needs more has no length
 
 
@@ -32,24 +32,26 @@ class Robust(NonlinearSolver):
 
     def steps(self, problem: NonlinearProblem, tangent: KeptTangent, start: np.ndarray) -> Iterator[Step]:
         """The states of all methods tried, one after the other."""
-        seen = Seen(problem)
         yield Step(start)
-        state = yield from self._descent(seen, tangent, start)
+        state = yield from self._descent(problem, tangent, start)
         for _ in range(self.leaps):
-            landed = leap(seen, tangent, state)
+            landed = leap(problem, tangent, state)
             if landed is None:
                 break
             yield Step(landed)
-            state = yield from self._descent(seen, tangent, landed)
-        yield from PseudoTransient().steps(seen, tangent, start)
+            state = yield from self._descent(problem, tangent, landed)
+        yield from PseudoTransient().steps(problem, tangent, start)
 
-    def _descent(self, problem: Seen, tangent: KeptTangent, start: np.ndarray) -> Generator[Step, None, np.ndarray]:
+    def _descent(
+        self, problem: NonlinearProblem, tangent: KeptTangent, start: np.ndarray
+    ) -> Generator[Step, None, np.ndarray]:
         """Newton's states behind the start, as long as ‖R‖ falls; returns the best of them."""
         state, least = start, list[float]()
         try:
-            for step in Newton().steps(problem, tangent, start):
-                size = problem.size(step.state)
+            for step, residual in Newton().steps_and_residuals(problem, tangent, start):
+                size = float(np.linalg.norm(residual))
                 if not size <= FAR * min([size, *least[:1]]):
+                    tangent.observe(contraction=FAR)  # the driver is not shown this step and cannot measure it
                     break
                 if least:  # the start has been shown
                     yield step
@@ -63,43 +65,17 @@ class Robust(NonlinearSolver):
         return state
 
 
-def leap(problem: Seen, tangent: KeptTangent, state: np.ndarray) -> np.ndarray | None:
+def leap(problem: NonlinearProblem, tangent: KeptTangent, state: np.ndarray) -> np.ndarray | None:
     """u − t K*⁻¹ R(u) with the largest t = 1, ½, … for which ‖R‖ is finite and at most `FAR` times what it was."""
     try:
-        tangent.refresh_if_due(problem, state)
-        direction = -tangent.solve(problem.residual(state))
+        tangent.refresh_if_due(lambda: problem.jacobian(state))
+        residual = problem.residual(state)
+        direction = -tangent.solve(residual)
     except SolveError:
         return None
-    highest = FAR * problem.size(state)
+    highest = FAR * float(np.linalg.norm(residual))
     for halving in range(HALVINGS + 1):
         landed = state + 0.5**halving * direction
-        if problem.size(landed) <= highest:
+        if float(np.linalg.norm(problem.residual(landed))) <= highest:
             return landed
     return None
-
-
-class Seen(NonlinearProblem):
-    """R(u) = 0, with the norm of the last residual remembered."""
-
-    def __init__(self, problem: NonlinearProblem) -> None:
-        self._problem = problem
-        self._last: tuple[np.ndarray, float] | None = None
-        self.is_gradient = problem.is_gradient
-
-    def size(self, u: np.ndarray) -> float:
-        """‖R(u)‖, evaluated again only where the last residual was another state's."""
-        if self._last is None or not np.array_equal(self._last[0], u):
-            self.residual(u)
-        assert self._last is not None
-        return self._last[1]
-
-    def residual(self, u: np.ndarray) -> np.ndarray:
-        residual = self._problem.residual(u)
-        self._last = u.copy(), float(np.linalg.norm(residual))
-        return residual
-
-    def jacobian(self, u: np.ndarray) -> Any:
-        return self._problem.jacobian(u)
-
-    def expand(self, u: np.ndarray) -> Expansion:
-        return self._problem.expand(u)

@@ -7,7 +7,7 @@ from typing import Any, ClassVar, Literal
 
 import numpy as np
 
-from nlsolve.plugin import AssembledOnce, KeptTangent, NonlinearProblem, NonlinearSolver, SolveError, Status, Step
+from nlsolve.plugin import KeptTangent, NonlinearProblem, NonlinearSolver, SolveError, Status, Step, cached_jacobian
 
 ACCEPTED = 1e-4  # decrease of ‖R‖ over the predicted one from which a step is taken
 POOR, GOOD = 0.25, 0.75  # the same ratio below which Δ is cut to a quarter of the step, above which it is doubled
@@ -25,30 +25,32 @@ class TrustRegion(NonlinearSolver):
 
     def steps(self, problem: NonlinearProblem, tangent: KeptTangent, start: np.ndarray) -> Iterator[Step]:
         """The iterates u_0, u_1, …"""
-        problem, state, radius = AssembledOnce(problem), start, np.inf
+        jacobian, state, radius = cached_jacobian(problem), start, np.inf
         residual = problem.residual(state)
         yield Step(state)
         while True:
-            size = float(np.linalg.norm(residual))
-            tangent.refresh_if_due(problem, state)
+            tangent.refresh_if_due(lambda: jacobian(state))
             chord = -tangent.solve(residual)
-            if size == 0.0:
+            if float(np.linalg.norm(residual)) == 0.0:
                 yield Step(state)
                 continue
             if not np.isfinite(radius):
                 radius = float(np.linalg.norm(chord))
-            step, residual, radius = self._accepted(problem, state, residual, chord, radius)
+            step, residual, radius = self._accepted(problem, jacobian(state), state, residual, chord, radius)
             state = state + step
-            contraction = float(np.linalg.norm(residual)) / size
-            tangent.observe(contraction=contraction)
-            yield Step(state, notes={"contraction": contraction})
+            yield Step(state)
 
     @staticmethod
     def _accepted(
-        problem: NonlinearProblem, state: np.ndarray, residual: np.ndarray, chord: np.ndarray, radius: float
+        problem: NonlinearProblem,
+        jacobian: Any,
+        state: np.ndarray,
+        residual: np.ndarray,
+        chord: np.ndarray,
+        radius: float,
     ) -> tuple[np.ndarray, np.ndarray, float]:
         """The first dogleg step of shrinking regions that ‖R‖ falls for, the residual there, and the next Δ."""
-        size, jacobian = float(np.linalg.norm(residual)), problem.jacobian(state)
+        size = float(np.linalg.norm(residual))
         cauchy = cauchy_point(jacobian, residual)
         smallest = SMALLEST * float(np.linalg.norm(state) + np.linalg.norm(chord))
         while radius > smallest:
@@ -68,7 +70,7 @@ class TrustRegion(NonlinearSolver):
 
 def cauchy_point(jacobian: Any, residual: np.ndarray) -> np.ndarray:
     """−g ‖g‖²/‖J g‖² with g = Jᵀ R: where ‖R + J s‖ is least along the steepest descent."""
-    gradient = jacobian.transposed_product(residual)
+    gradient = jacobian.T @ residual
     along = jacobian @ gradient
     return -gradient * (gradient @ gradient) / (along @ along)
 

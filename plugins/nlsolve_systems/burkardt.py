@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from nlsolve.plugin import upright
+from nlsolve.plugin import as_column
 from nlsolve_systems.more import discrete_integral, watson_interior
 
 TINY = 1e-4
@@ -38,7 +38,7 @@ def hammarling(u: Any) -> Any:
     a = TINY * np.eye(m)
     a[0, 1] = 1.0
     square = sum(x[:, k, None] * x[None, k] for k in range(m))
-    return square.reshape(*u.shape) - upright(a.ravel(), u)
+    return square.reshape(*u.shape) - as_column(a.ravel(), u)
 
 
 def dennis_schnabel(u: Any) -> Any:

@@ -13,12 +13,12 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 
-from nlsolve.plugin import upright
+from nlsolve.plugin import as_column
 
 
 def numbers(u: Any) -> np.ndarray:
-    """k = 1 … U, upright."""
-    return upright(np.arange(1.0, u.shape[0] + 1.0), u)
+    """k = 1 … U, as a column."""
+    return as_column(np.arange(1.0, u.shape[0] + 1.0), u)
 
 
 @cache
@@ -155,7 +155,7 @@ def extended_rosenbrock(u: Any) -> Any:
 def gulf(u: Any) -> Any:
     """exp(−|y_i − b|ᶜ/a) − t_i,  t_i = i/100,  y_i = 25 + (−50 ln t_i)^{2/3},  i = 1, 2, 3; (11), m = 3."""
     a, b, c = u
-    t = upright(np.arange(1.0, 4.0) / 100.0, u)
+    t = as_column(np.arange(1.0, 4.0) / 100.0, u)
     y = 25.0 + (-50.0 * np.log(t)) ** (2.0 / 3.0)
     return np.exp(-np.exp(0.5 * c * np.log((y - b) ** 2)) / a) - t
 
@@ -163,13 +163,13 @@ def gulf(u: Any) -> Any:
 def box(u: Any) -> Any:
     """e^{−t a} − e^{−t b} − c (e^{−t} − e^{−10 t}),  t = 0.1, 0.2, 0.3; (12), m = 3."""
     a, b, c = u
-    t = upright(np.arange(1.0, 4.0) / 10.0, u)
+    t = as_column(np.arange(1.0, 4.0) / 10.0, u)
     return np.exp(-t * a) - np.exp(-t * b) - c * (np.exp(-t) - np.exp(-10.0 * t))
 
 
 def biggs(u: Any) -> Any:
     """c e^{−t a} − d e^{−t b} + f e^{−t e} − y,  y = e^{−t} − 5 e^{−10 t} + 3 e^{−4 t},  t = 0.1 … 0.6; (18), m = 6."""
     a, b, c, d, e, f = u
-    t = upright(np.arange(1.0, 7.0) / 10.0, u)
+    t = as_column(np.arange(1.0, 7.0) / 10.0, u)
     y = np.exp(-t) - 5.0 * np.exp(-10.0 * t) + 3.0 * np.exp(-4.0 * t)
     return c * np.exp(-t * a) - d * np.exp(-t * b) + f * np.exp(-t * e) - y

@@ -18,8 +18,8 @@ from nlsolve_solvers import Newton
 from nlsolve import Status
 from nlsolve.contracts.continuum.law import stress
 from nlsolve.flow.momentum import Flow, Inertia, node_major
-from nlsolve.solving.simulate import run_case as march
 from nlsolve.plugin import PointOperators
+from nlsolve.solving.simulate import run_case as march
 from nlsolve.solving.stopping import Budget
 from nlsolve.testing import check_problem
 

@@ -40,7 +40,7 @@ from nlsolve.show.tables import TableSpec, build
 from nlsolve.solving.simulate import Record
 from nlsolve.solving.simulate import run_case as march
 from nlsolve.study.study import Study
-from nlsolve.testing.toy_problem import SmallProblem
+from nlsolve.testing.toy_problem import ToyProblem
 
 UNIT = UnitCosts(
     residual=2.0,
@@ -68,10 +68,10 @@ class Clock:
 
 
 class Priced(NonlinearProblem):
-    """SmallProblem whose work takes the seconds of UNIT, times `pace`; the second of each kind takes much longer."""
+    """ToyProblem whose work takes the seconds of UNIT, times `pace`; the second of each kind takes much longer."""
 
     def __init__(self, clock: Clock, pace: float) -> None:
-        self.clock, self.pace, self.small = clock, pace, SmallProblem()
+        self.clock, self.pace, self.small = clock, pace, ToyProblem()
         self.calls: dict[str, int] = {}
 
     def spend(self, kind: str, seconds: float) -> None:
@@ -128,7 +128,7 @@ class PricedSolver(LinearSolver):
 def test_unit_costs_are_the_medians_of_rounds_and_the_line_through_the_orders() -> None:
     clock, pace = Clock(), 1e-6
     problem = Priced(clock, pace)
-    found = measure(problem, PricedSolver(problem=problem), SmallProblem.solution, rounds=5, clock=clock)
+    found = measure(problem, PricedSolver(problem=problem), ToyProblem.solution, rounds=5, clock=clock)
     assert problem.calls["jacobian"] >= 5
     assert found.columns() == pytest.approx({name: pace * price for name, price in UNIT.columns().items()})
     assert found.ratio == pytest.approx(25.0)
@@ -137,7 +137,7 @@ def test_unit_costs_are_the_medians_of_rounds_and_the_line_through_the_orders() 
 def test_no_round_is_begun_after_enough_seconds() -> None:
     clock = Clock()
     problem = Priced(clock, pace=1.0)  # its first factorisation takes longer than enough
-    measure(problem, PricedSolver(problem=problem), SmallProblem.solution, rounds=9, clock=clock)
+    measure(problem, PricedSolver(problem=problem), ToyProblem.solution, rounds=9, clock=clock)
     assert problem.calls["factorization"] == 1 + 2
     assert problem.calls["residual"] == 2 * ORDER
 

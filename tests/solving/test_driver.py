@@ -17,11 +17,13 @@ from pydantic import ValidationError
 
 from nlsolve import SolveError, Status
 from nlsolve.plugin import Expansion, KeptTangent, NonlinearProblem, NonlinearSolver, Series, Step
+from nlsolve.results.columns import STEPS
+from nlsolve.results.frames import steps_frame
 from nlsolve.solving.driver import PATIENCE
 from nlsolve.solving.stopping import Budget, StoppingTest
-from nlsolve.testing.toy_problem import DenseLU, SmallProblem
+from nlsolve.testing.toy_problem import DenseLU, ToyProblem
 
-START = SmallProblem.solution + 0.5 * np.cos(np.arange(12.0))
+START = ToyProblem.solution + 0.5 * np.cos(np.arange(12.0))
 
 
 class Scalar(NonlinearProblem):
@@ -78,23 +80,23 @@ ONE = np.array([1.0])
 
 
 def test_converged() -> None:
-    outcome, _ = run(SmallProblem(), Newton(), EveryIteration(), START, DenseLU())
+    outcome, _ = run(ToyProblem(), Newton(), EveryIteration(), START, DenseLU())
     assert outcome.status is Status.CONVERGED
     assert outcome.detail == Status.CONVERGED.sentence
     assert outcome.residual_norm <= 1e-10
     assert [row["step"] for row in outcome.steps] == list(range(len(outcome.steps)))
-    np.testing.assert_allclose(outcome.state, SmallProblem.solution, atol=1e-10)
+    np.testing.assert_allclose(outcome.state, ToyProblem.solution, atol=1e-10)
 
 
 def test_a_start_that_is_the_solution_takes_no_step() -> None:
-    outcome, ledger = run(SmallProblem(), Newton(), EveryIteration(), SmallProblem.solution.copy(), DenseLU())
+    outcome, ledger = run(ToyProblem(), Newton(), EveryIteration(), ToyProblem.solution.copy(), DenseLU())
     assert outcome.status is Status.CONVERGED
     assert len(outcome.steps) == 1
     assert ledger.counts["factorization"] == 0
 
 
 def test_budget_spent() -> None:
-    outcome, ledger = run(SmallProblem(), ModifiedNewton(), Never(), START, DenseLU(), iterations=3)
+    outcome, ledger = run(ToyProblem(), ModifiedNewton(), Never(), START, DenseLU(), iterations=3)
     assert outcome.status is Status.BUDGET_SPENT
     assert len(outcome.steps) == 4  # the start and three iterations
     assert ledger.counts["triangular_solve"] == 3
@@ -160,10 +162,10 @@ def test_non_finite_right_hand_side() -> None:
     class Blind(NonlinearSolver):
         def steps(self, problem: NonlinearProblem, tangent: KeptTangent, start: np.ndarray) -> Iterator[Step]:
             yield Step(start)
-            tangent.refresh_if_due(problem, start)
+            tangent.refresh_if_due(lambda: problem.jacobian(start))
             tangent.solve(np.full_like(start, np.nan))
 
-    outcome, _ = run(SmallProblem(), Blind(), None, START, DenseLU())
+    outcome, _ = run(ToyProblem(), Blind(), None, START, DenseLU())
     assert outcome.status is Status.NON_FINITE
     assert "right-hand side" in outcome.detail
 
@@ -210,6 +212,31 @@ def test_every_status_has_a_sentence_of_its_own() -> None:
     assert len(sentences) == len(Status)
     assert all(len(sentence.split()) > 4 for sentence in sentences)
     assert Status.NON_FINITE.word == "non finite"
+
+
+# Notes.
+
+
+class Noting(NonlinearSolver):
+    """Halves the state, and notes more than there are columns for."""
+
+    def steps(self, problem: NonlinearProblem, tangent: KeptTangent, start: np.ndarray) -> Iterator[Step]:
+        yield Step(start)
+        yield Step(0.5 * start, notes={"length": 0.5, "shift": 3.0, "why": "because", "residual_norm": 0.0, "step": 9})
+
+
+def test_a_note_without_a_column_is_kept_under_its_name() -> None:
+    outcome, _ = run(IDENTITY, Noting(), None, ONE)
+    row = outcome.steps[1]
+    assert (row["length"], row["note.shift"], row["note.why"]) == (0.5, 3.0, "because")
+    frame = steps_frame(outcome.steps)
+    assert list(frame.columns) == [*(name for name in STEPS if name != "case"), "note.shift", "note.why"]
+    assert frame["note.shift"].tolist()[1:] == [3.0]
+
+
+def test_a_note_does_not_take_the_place_of_what_the_driver_measured() -> None:
+    outcome, _ = run(IDENTITY, Noting(), None, ONE)
+    assert (outcome.steps[1]["step"], outcome.steps[1]["residual_norm"]) == (1, 0.5)
 
 
 # Stopping tests.

@@ -1,7 +1,7 @@
 """u ← u + t w : how long the step along a direction w may be. The contract of globalisations.
 
-search = globalization.search(problem)                      # once a solve
-t, residual = search.length(problem, u, R(u), w, promised)  # once a step; the residual is that of u + t w
+search = globalization.search(problem)                                # once a solve
+t, residual = search.length(problem, u, R(u), w, predicted_decrease)  # once a step; the residual is that of u + t w
 """
 
 from __future__ import annotations
@@ -18,12 +18,17 @@ class Search(Protocol):
     """The step lengths of one solve; it may remember the steps before."""
 
     def length(
-        self, problem: NonlinearProblem, state: Array, residual: Array, direction: Array, promised: float = 1.0
+        self,
+        problem: NonlinearProblem,
+        state: Array,
+        residual: Array,
+        direction: Array,
+        predicted_decrease: float = 1.0,
     ) -> tuple[float, Array]:
         """Step length t > 0 and R(state + t direction), (U,).
 
-        promised : the part of ‖R‖ that a full step would take away if R were linear: 1 of Newton's direction, 1 − η of
-        an inexact one with ‖R + J w‖ = η ‖R‖.
+        predicted_decrease : the part of ‖R‖ that a full step would take away if R were linear: 1 of Newton's direction,
+        1 − η of an inexact one with ‖R + J w‖ = η ‖R‖.
         """
 
 

@@ -10,15 +10,16 @@ from nlsolve.contracts.component import Component
 
 
 @dataclass(frozen=True)
-class Evidence:
-    """What a refresh rule may look at. Fields are None until they have been observed on this tangent.
+class TangentHistory:
+    """What has been observed of one K* since it was factorised. A field is None until it has been observed.
 
-    uses : iterations or series this tangent has served since it was factorised.
-    contraction : ‖R‖ after the last step over ‖R‖ before it, by the solve where a step takes several.
-    range : a_max of the last series computed with this tangent.
-    solves : right-hand sides solved with this tangent.
-    digits : decimal digits by which the residual has fallen with it, Σ lg(1/contraction) over its solves.
-    rate : digits by solve, the recent ones: contractions differ between the first and the last steps of an increment.
+    uses : iterations or series that K* has served.
+    contraction : ‖R‖ after the last step over ‖R‖ before it, which the driver measures after every step. A method that
+        takes several solves in a step reports the contraction per solve instead.
+    range : a_max of the last series computed with K*.
+    solves : right-hand sides solved with K*.
+    digits : decimal digits by which the residual has fallen with K*, Σ lg(1/contraction) over its solves.
+    rate : digits per solve, a mean in which recent solves weigh most.
     """
 
     uses: int = 0
@@ -35,5 +36,5 @@ class RefreshRule(Component, ABC):
     noun: ClassVar[str] = "refresh"
 
     @abstractmethod
-    def due(self, evidence: Evidence) -> bool:
-        """True when the tangent should be replaced by the one at the present state."""
+    def due(self, history: TangentHistory) -> bool:
+        """True when K* should be replaced by the tangent at the present state."""

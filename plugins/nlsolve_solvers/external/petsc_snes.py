@@ -109,5 +109,7 @@ class PetscSnes(NonlinearSolver):
         }
 
 
+# A SNES must outlive its runs: lags that persist are counted on from one solve of a march to the next. A component is a
+# frozen value and cannot hold one, so it is found by the tangent that is kept throughout the march, and goes with it.
 _kept: WeakKeyDictionary[KeptTangent, tuple[str, Snes]] = WeakKeyDictionary()
 atexit.register(_kept.clear)  # PETSc must not end before its objects do

@@ -41,7 +41,7 @@ class ScipyRoot(NonlinearSolver):
         yield Step(state)
         while True:
             if self.precondition:
-                tangent.refresh_if_due(problem, state)
+                tangent.refresh_if_due(lambda: problem.jacobian(state))
             found, values = self._run(problem, tangent, state, known, min(goal, LEAST_GAIN * size))
             state = state + (tangent.solve(found.x) if self.precondition else found.x)
             to_the_end = self.method == "hybr" or goal <= LEAST_GAIN * size

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from nlsolve.plugin import AssembledOnce, KeptTangent, NonlinearProblem, SolveError, Status, Step
+from nlsolve.plugin import KeptTangent, NonlinearProblem, SolveError, Status, Step, cached_jacobian
 
 LEAST_GAIN = 0.1  # each run goes on until this part of the residual it began with is left
 
@@ -18,18 +18,19 @@ class Served:
 
     goal : ‖R‖₂ at which the run may end: the one given, and a tenth of the first ‖R‖₂.
     direct : whether the library shall take K* for its Jacobian, as with a factorised one, or multiply with J(u).
-    contraction : what the refresh rule was last told.
+    contraction : per solve with K*, what the refresh rule was last told; None before there was a solve.
     error : what a callback raised. An exception does not find its way through a library, so it waits here.
     """
 
     def __init__(
         self, problem: NonlinearProblem, tangent: KeptTangent, start: np.ndarray, goal: float, direct: bool
     ) -> None:
-        self._problem, self._tangent, self._direct = AssembledOnce(problem), tangent, direct
+        self._problem, self._tangent, self._direct = problem, tangent, direct
+        self._jacobian = cached_jacobian(problem)
         self.goal = goal
         self.error: BaseException | None = None
         self._sizes: dict[bytes, float] = {}
-        self.contraction = float("nan")
+        self.contraction: float | None = None
         self._at_tangent: np.ndarray | None = None  # where K* was last asked for
         self._solves = 0  # since then
         self._solved: tuple[np.ndarray, np.ndarray] | None = None
@@ -72,7 +73,7 @@ class Served:
         self.observe(u)
         self._state = self._at_tangent = u.copy()
         self._solves = 0
-        self._tangent.refresh_if_due(self._problem, u)
+        self._tangent.refresh_if_due(lambda: self._jacobian(u))
 
     def observe(self, u: np.ndarray) -> None:
         """Tell the refresh rule what each solve with K* has left, at u, of the residual since K* was asked for."""
@@ -96,11 +97,11 @@ class Served:
         """J(u) v; where K* stands for J and v is its last solution K*⁻¹ b, that is b."""
         if self._direct and self._solved is not None and np.array_equal(v, self._solved[0]):
             return self._solved[1]
-        return self._problem.jacobian(self._state) @ v
+        return self._jacobian(self._state) @ v
 
     def transposed_product(self, v: np.ndarray) -> Any:
         """J(u)ᵀ v."""
-        return self._problem.jacobian(self._state).transposed_product(v)
+        return self._jacobian(self._state).T @ v
 
 
 @dataclass(frozen=True)
@@ -144,4 +145,5 @@ def runs(
             raise SolveError(Status.STAGNATED, ending.gave_up)
         stuck = again
         claim = False if ending.gave_up else None
-        yield Step(state, claim, {"contraction": served.contraction, **ending.reported})
+        contraction = {} if served.contraction is None else {"contraction": served.contraction}
+        yield Step(state, claim, {**contraction, **ending.reported})

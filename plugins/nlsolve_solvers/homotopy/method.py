@@ -77,9 +77,9 @@ class AsymptoticNumericalMethod(NonlinearSolver):
         goal = None if self.residual is None else self.residual * problem.scale(start)
         yield Step(state)
         while True:
-            fresh = tangent.refresh_if_due(problem, state)
+            fresh = tangent.refresh_if_due(lambda: problem.jacobian(state))
             branch, reach, limit = self._branch(problem, tangent, state, goal)
-            if reach < 1.0 and not fresh and tangent.refresh_if_due(problem, state):
+            if reach < 1.0 and not fresh and tangent.refresh_if_due(lambda: problem.jacobian(state)):
                 branch, reach, limit = self._branch(problem, tangent, state, goal)
             length = min(1.0, reach)
             if not length > SHORTEST_RANGE:

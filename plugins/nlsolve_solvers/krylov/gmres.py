@@ -1,6 +1,14 @@
 """min ‖b − A x‖₂ over x = M⁻¹ v, v in span{b, A M⁻¹ b, …} : GMRES, preconditioned on the right.
 
-Saad & Schultz (1986).
+Saad & Schultz (1986), flexible (Saad 1993). SciPy's `gmres` preconditions on the left, so that it minimises, and stops
+by, ‖M⁻¹ (b − A x)‖, at two solves and a product more; its `gcrotmk` preconditions on the right, but returns x alone. An
+inexact Newton method needs
+
+- preconditioning on the right, so that ‖b − A x‖ itself is minimised and compared with the forcing term;
+- x = Z y from the directions z_k = M⁻¹ v_k as they were stored, without a further solve, and right also where M changes
+  from one to the next, as an M that iterates does;
+- ‖b − A x‖ and the dimension as results: the next forcing term is made of the one, and of both the contraction per
+  solve, by which the refresh rule judges K*.
 """
 
 from __future__ import annotations

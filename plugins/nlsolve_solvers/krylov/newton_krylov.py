@@ -8,7 +8,7 @@ from typing import ClassVar, Literal
 import numpy as np
 from pydantic import Field
 
-from nlsolve.plugin import AssembledOnce, Globalized, KeptTangent, NonlinearProblem, NonlinearSolver, Step
+from nlsolve.plugin import Globalized, KeptTangent, NonlinearProblem, NonlinearSolver, Step, cached_jacobian
 from nlsolve_solvers.krylov.forcing import next_forcing
 from nlsolve_solvers.krylov.gmres import gmres
 
@@ -17,7 +17,7 @@ SMALLEST_FORCING = 1e-6  # below it lies what the next residual will correct any
 
 class NewtonKrylov(NonlinearSolver):
     """Dembo, Eisenstat & Steihaug (1982); forcing terms η of Eisenstat & Walker (1996), and t from a globalisation,
-    which is told that w promises 1 − ‖R + J w‖/‖R‖ only.
+    which is told that the decrease predicted along w is 1 − ‖R + J w‖/‖R‖ only.
 
     J w comes from the assembled Jacobian, or without one from the residual's own series: [R(u + a w)]_1. The refresh
     rule is told the contraction per inner iteration: that is what K* can be held responsible for.
@@ -28,8 +28,10 @@ class NewtonKrylov(NonlinearSolver):
         "ratio", description="η: choice 1 or choice 2 of Eisenstat and Walker, or the first η throughout"
     )
     first_forcing: float = Field(0.1, gt=0, lt=1, description="η of the first iteration")
-    products: Literal["jacobian", "series"] = Field(
-        "series", description="J w by a Jacobian assembled once an iteration, or each by a series of order 1"
+    products: Literal["auto", "jacobian", "series"] = Field(
+        "auto",
+        description="J w by a Jacobian assembled once an iteration, or each by a series of order 1; auto: by series "
+        "where the problem has one",
     )
     dimension: int = Field(40, gt=0, description="largest dimension of the Krylov space")
     globalization: Globalized = Field(  # type: ignore[assignment]
@@ -39,17 +41,19 @@ class NewtonKrylov(NonlinearSolver):
 
     def steps(self, problem: NonlinearProblem, tangent: KeptTangent, start: np.ndarray) -> Iterator[Step]:
         """The iterates u_0, u_1, …"""
-        problem, search = AssembledOnce(problem), self.globalization.search(problem)
+        jacobian, search = cached_jacobian(problem), self.globalization.search(problem)
         state, eta = start, self.first_forcing
+        by_series = self.products == "series" or (self.products == "auto" and problem.has_series)
         residual = problem.residual(state)
         yield Step(state)
         while True:
             size = float(np.linalg.norm(residual))
-            tangent.refresh_if_due(problem, state)
+            tangent.refresh_if_due(lambda: jacobian(state))
             if size == 0.0:
                 yield Step(state)
                 continue
-            found = gmres(self._product(problem, state), tangent.solve, -residual, eta * size, self.dimension)
+            product = along(problem, state) if by_series else jacobian(state).__matmul__
+            found = gmres(product, tangent.solve, -residual, eta * size, self.dimension)
             length, residual = search.length(problem, state, residual, found.solution, 1.0 - found.left / size)
             state = state + length * found.solution
             contraction = (found.left / size) ** (1.0 / found.count)
@@ -58,14 +62,13 @@ class NewtonKrylov(NonlinearSolver):
             size_now = float(np.linalg.norm(residual))
             eta = max(next_forcing(self.forcing, eta, size_now, size, found.left), SMALLEST_FORCING)
 
-    def _product(self, problem: NonlinearProblem, state: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:
-        """w ↦ J w at the state."""
-        if self.products == "jacobian":
-            return problem.jacobian(state).__matmul__
 
-        def along(w: np.ndarray) -> np.ndarray:
-            expansion = problem.expand(state)
-            expansion.append(w)
-            return expansion.coefficient(1)
+def along(problem: NonlinearProblem, state: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:
+    """w ↦ J w = [R(u + a w)]_1."""
 
-        return along
+    def product(w: np.ndarray) -> np.ndarray:
+        expansion = problem.expand(state)
+        expansion.append(w)
+        return expansion.coefficient(1)
+
+    return product

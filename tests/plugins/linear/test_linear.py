@@ -26,10 +26,11 @@ from nlsolve_solvers.modified_newton import ModifiedNewton
 
 from nlsolve import SolveError, Status
 from nlsolve.plugin import Factors, LinearSolver
-from nlsolve.solving.ledger import Audited, Ledger, SealedMatrix, factorize_counted, solve_counted
+from nlsolve.solving.ledger import Ledger
 from nlsolve.solving.stopping import StoppingTest
+from nlsolve.solving.tangent import Tangent
 from nlsolve.testing import check_linear_solver
-from nlsolve.testing.toy_problem import SmallProblem
+from nlsolve.testing.toy_problem import ToyProblem
 
 needs_rslab = pytest.mark.skipif(
     nlsolve_rslab.rslab is None, reason="rslab is not installed: pip install 'nlsolve[rslab]'"
@@ -42,18 +43,7 @@ LINEARS: list[Any] = [
     pytest.param(Rslab(), marks=needs_rslab),
     pytest.param(Rslab(symmetric="never", refinement=1), marks=needs_rslab),
 ]
-START = SmallProblem.solution + 0.5 * np.cos(np.arange(12.0))
-
-
-def seal(matrix: Any, ledger: Ledger) -> SealedMatrix:
-    """The matrix as a Jacobian handed out by a problem."""
-
-    class Constant(SmallProblem):
-        def jacobian(self, u: Any) -> Any:
-            return matrix
-
-    sealed: Any = Audited(Constant(), ledger).view.jacobian(START)
-    return sealed
+START = ToyProblem.solution + 0.5 * np.cos(np.arange(12.0))
 
 
 def tangent(form: str = "strong") -> Any:
@@ -225,9 +215,9 @@ class TestWeakPivoting:
 
     def left(self, linear: LinearSolver) -> tuple[float, Ledger]:
         ledger = Ledger()
-        sealed = seal(self.matrix, ledger)
-        factors = factorize_counted(linear, sealed, None, ledger)
-        x = solve_counted(factors, sealed, self.rhs, linear.refinement, ledger)
+        kept = Tangent(linear, None, ledger)
+        kept.refresh_if_due(lambda: self.matrix)
+        x = kept.solve(self.rhs)
         size = np.linalg.norm(abs(self.matrix) @ np.abs(x) + self.rhs)
         return float(np.linalg.norm(self.rhs - self.matrix @ x) / size), ledger
 

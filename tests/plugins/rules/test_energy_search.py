@@ -22,13 +22,14 @@ from nlsolve.flow.continuation import Start
 from nlsolve.flow.momentum import Flow
 from nlsolve.plugin import Discretizer
 from nlsolve.series import Array
+from nlsolve.solving.counted_problem import CountedProblem
 from nlsolve.solving.driver import solve
-from nlsolve.solving.ledger import Audited, Ledger
+from nlsolve.solving.ledger import Ledger
 from nlsolve.solving.simulate import run_case as march
 from nlsolve.solving.stopping import Budget, StoppingTest
 from nlsolve.solving.tangent import Tangent
 from nlsolve.testing import check_solver
-from nlsolve.testing.toy_problem import SmallProblem
+from nlsolve.testing.toy_problem import ToyProblem
 
 ENERGY = Newton(globalization=Energy())
 AT_ONCE = Start(values=(1.0,))  # the Newtonian flow, whose one linear solve is a start like any other
@@ -63,7 +64,7 @@ def iterates(flow: Flow, solver: Newton, start: Array, rule: Any = None, most: i
     """States of the method until ‖R‖ is 10⁻¹⁰ of its scale."""
     found: list[Array] = []
     scale, ledger = flow.scale(start), Ledger()
-    for step in solver.steps(Audited(flow, ledger).view, Tangent(PLAIN, rule, ledger).view, start):
+    for step in solver.steps(CountedProblem(flow, ledger), Tangent(PLAIN, rule, ledger), start):
         found.append(step.state)
         if np.linalg.norm(flow.residual(step.state)) <= 1e-10 * scale or len(found) > most:
             break
@@ -178,7 +179,7 @@ def test_a_strong_form_has_no_potential(solver: Newton) -> None:
     assert REFUSAL in outcome.detail
     assert ledger.counts["factorization"] == 0
     with pytest.raises(SolveError, match="without convection"):
-        next(iter(solver.steps(flow, Tangent(PLAIN, None, Ledger()).view, rest)))
+        next(iter(solver.steps(flow, Tangent(PLAIN, None, Ledger()), rest)))
 
 
 def test_a_case_that_is_refused_is_a_row_with_the_sentence() -> None:
@@ -191,7 +192,7 @@ def test_a_case_that_is_refused_is_a_row_with_the_sentence() -> None:
         assert REFUSAL in row["message"]
 
 
-class GradientProblem(SmallProblem):
+class GradientProblem(ToyProblem):
     """A u + sinh u = b with A symmetric: the gradient of ½ uᵀA u + Σ cosh u − bᵀu, and said to be."""
 
     is_gradient = True
@@ -211,7 +212,7 @@ def test_the_small_problem_by_energy(solver: Newton, rule: Any) -> None:
         np.testing.assert_allclose(outcome.state, problem.solution, atol=1e-9)
 
 
-def small(problem: SmallProblem, solver: Newton, rule: Any, start: Array) -> Any:
+def small(problem: ToyProblem, solver: Newton, rule: Any, start: Array) -> Any:
     ledger = Ledger()
     tangent = Tangent(PLAIN, rule, ledger)
     return solve(problem, solver, tangent, start, StoppingTest(tolerance=1e-11), Budget(), ledger), ledger
@@ -222,11 +223,11 @@ def small(problem: SmallProblem, solver: Newton, rule: Any, start: Array) -> Any
 @pytest.mark.parametrize("search", ["backtracking", "energy"])
 def test_the_solvers_conform(kind: type[Newton], rule: Any, search: str, monkeypatch: pytest.MonkeyPatch) -> None:
     if search == "energy":
-        monkeypatch.setattr(SmallProblem, "is_gradient", True)  # which it is: A is symmetric
+        monkeypatch.setattr(ToyProblem, "is_gradient", True)  # which it is: A is symmetric
     check_solver(kind.model_validate({"globalization": {"kind": search}}), rule)
 
 
 def test_the_check_of_solvers_reports_a_refusal(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(SmallProblem, "is_gradient", False)
-    with pytest.raises(AssertionError, match="a small convex problem was not solved: the globalization"):
+    monkeypatch.setattr(ToyProblem, "is_gradient", False)
+    with pytest.raises(AssertionError, match="the toy problem was not solved: the globalization"):
         check_solver(ENERGY)

@@ -21,17 +21,18 @@ from nlsolve import SolveError, Status
 from nlsolve.contracts.outcome import Outcome
 from nlsolve.plugin import NonlinearSolver, RefreshRule
 from nlsolve.results.columns import REPORTED
+from nlsolve.solving.counted_problem import CountedProblem
 from nlsolve.solving.driver import solve
-from nlsolve.solving.ledger import Audited, Ledger
+from nlsolve.solving.ledger import Ledger
 from nlsolve.solving.stopping import Budget, StoppingTest
 from nlsolve.solving.tangent import Tangent
 from nlsolve.testing import check_solver
-from nlsolve.testing.toy_problem import DenseLU, SmallProblem
+from nlsolve.testing.toy_problem import DenseLU, ToyProblem
 
 needs_petsc = pytest.mark.skipif(petsc_snes.PETSc is None, reason="petsc4py is not installed: README says how")
 needs_kinsol = pytest.mark.skipif(kinsol.kinsol is None, reason="sundials4py is not installed: README says how")
 
-START = SmallProblem.solution + 0.5 * np.cos(np.arange(12.0))
+START = ToyProblem.solution + 0.5 * np.cos(np.arange(12.0))
 STOP = StoppingTest(tolerance=1e-8)
 OBSERVED = {
     "reported_residuals": "residual",
@@ -114,7 +115,7 @@ def test_scipy_reports_the_residuals_that_were_observed(method: Any) -> None:
 def test_scipy_reports_one_jacobian_too_few(precondition: bool) -> None:
     """The one by which its shape is checked (SciPy issue 24767); SciPys in which that is mended report all."""
     solver = ScipyRoot(method="hybr", jacobian="products", precondition=precondition)
-    outcome, ledger = run(SmallProblem(), solver, Never(), START, DenseLU())
+    outcome, ledger = run(ToyProblem(), solver, Never(), START, DenseLU())
     evaluated = ledger.counts["jacobian"] - ledger.counts["factorization"]
     assert outcome.status is Status.CONVERGED
     assert evaluated - reported(outcome, "reported_jacobians") in (1, 0)
@@ -124,7 +125,7 @@ def test_scipy_reports_one_jacobian_too_few(precondition: bool) -> None:
 
 def test_given_its_matrix_hybr_takes_fewer_residuals() -> None:
     counts = [
-        run(SmallProblem(), ScipyRoot(method="hybr", jacobian=how), Never(), START, DenseLU())[1].counts["residual"]
+        run(ToyProblem(), ScipyRoot(method="hybr", jacobian=how), Never(), START, DenseLU())[1].counts["residual"]
         for how in ("differences", "products")
     ]
     assert counts[0] >= counts[1] + 12
@@ -154,11 +155,11 @@ def test_the_reports_of_a_march_are_summed_beside_the_counts() -> None:
 def test_the_drivers_own_scale_costs_a_method_nothing() -> None:
     ledger = Ledger()
     flow = spin_flow(0.5)
-    audited = Audited(flow, ledger)
-    scale = audited.scale(START_OF_FLOW := near(flow, 0.52))
-    assert audited.view.scale(START_OF_FLOW.copy()) == scale == flow.scale(START_OF_FLOW)
+    counted = CountedProblem(flow, ledger)
+    scale = counted.uncounted_scale(START_OF_FLOW := near(flow, 0.52))
+    assert counted.scale(START_OF_FLOW.copy()) == scale == flow.scale(START_OF_FLOW)
     assert ledger.counts["residual"] == 0
-    assert audited.view.scale(2.0 * START_OF_FLOW) == flow.scale(2.0 * START_OF_FLOW)
+    assert counted.scale(2.0 * START_OF_FLOW) == flow.scale(2.0 * START_OF_FLOW)
     assert ledger.counts["residual"] == 1
 
 
@@ -255,14 +256,14 @@ def test_an_inexact_newton_needs_as_many_iterations_as_ours(theirs: NonlinearSol
 # What goes wrong in a callback, or in a library.
 
 
-class Constant(SmallProblem):
+class Constant(ToyProblem):
     """A residual that nothing changes."""
 
     def residual(self, u: Any) -> Any:
         return np.ones(12)
 
 
-class Failing(SmallProblem):
+class Failing(ToyProblem):
     """A residual that is known at the start alone."""
 
     def __init__(self, error: BaseException) -> None:
@@ -305,7 +306,7 @@ def test_so_does_any_other_exception(solver: Any, sentence: str, error: BaseExce
 
 @pytest.mark.parametrize(("solver", "sentence"), LIBRARIES)
 def test_a_residual_that_is_not_finite_is_a_status(solver: Any, sentence: str) -> None:
-    class Broken(SmallProblem):
+    class Broken(ToyProblem):
         def residual(self, u: Any) -> Any:
             return super().residual(u) if np.array_equal(u, START) else np.full(12, np.nan)
 
@@ -317,11 +318,11 @@ def test_a_residual_that_is_not_finite_is_a_status(solver: Any, sentence: str) -
 
 @needs_petsc
 def test_a_snes_lives_as_long_as_its_tangent() -> None:
-    ledger, problem = Ledger(), SmallProblem()
+    ledger, problem = Ledger(), ToyProblem()
     tangent = Tangent(DenseLU(), EveryIteration(), ledger)
     for _ in range(2):
         solve(problem, PetscSnes(), tangent, START, STOP, Budget(), ledger)
-        assert tangent.view in petsc_snes._kept
+        assert tangent in petsc_snes._kept
     kept = len(petsc_snes._kept)
     del tangent
     gc.collect()

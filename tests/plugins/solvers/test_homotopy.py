@@ -24,13 +24,13 @@ from nlsolve.plugin import Expansion, NonlinearProblem, Series
 from nlsolve.series import Array
 from nlsolve.solving.stopping import StoppingTest
 from nlsolve.testing import check_solver
-from nlsolve.testing.toy_problem import DenseLU, SmallProblem
+from nlsolve.testing.toy_problem import DenseLU, ToyProblem
 
 Method = AsymptoticNumericalMethod
 FIXED, NEWTON = "fixed-point", "newton"
 KINDS = ("series", *PADES)
 VARIANTS = list(product(FORMS, KINDS, RULES, (False, True)))
-SMALL = SmallProblem()
+SMALL = ToyProblem()
 START = SMALL.solution + 0.5 * np.cos(np.arange(12.0))
 STUDIES = Path(__file__).parents[3] / "studies"
 

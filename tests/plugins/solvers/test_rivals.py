@@ -28,6 +28,7 @@ from nlsolve_solvers import (
 from nlsolve_solvers.external import ScipyRoot
 from nlsolve_solvers.krylov.forcing import next_forcing
 from nlsolve_solvers.krylov.gmres import gmres
+from nlsolve_solvers.levenberg_marquardt import augmented
 from nlsolve_solvers.modified_newton import ModifiedNewton
 from nlsolve_solvers.trust_region import cauchy_point, dogleg
 from pydantic import ValidationError
@@ -35,14 +36,15 @@ from scipy.sparse import csr_array
 
 from nlsolve import SolveError, Status
 from nlsolve.flow.momentum import Convection, Flow
-from nlsolve.plugin import Evidence, Mixing, NonlinearProblem, NonlinearSolver, RefreshRule
-from nlsolve.solving.ledger import Audited, Ledger, factorize_counted
+from nlsolve.plugin import Mixing, NonlinearProblem, NonlinearSolver, RefreshRule, TangentHistory
+from nlsolve.solving.counted_problem import CountedProblem
+from nlsolve.solving.ledger import Ledger
 from nlsolve.solving.stopping import StoppingTest
 from nlsolve.solving.tangent import Tangent
 from nlsolve.testing import check_refresh_rule, check_solver
-from nlsolve.testing.toy_problem import DenseLU, SmallProblem
+from nlsolve.testing.toy_problem import DenseLU, ToyProblem
 
-START = SmallProblem.solution + 0.5 * np.cos(np.arange(12.0))
+START = ToyProblem.solution + 0.5 * np.cos(np.arange(12.0))
 METHODS = ("hybr", "krylov", "broyden1", "anderson", "df-sane")
 SOLVERS: tuple[NonlinearSolver, ...] = (
     Anderson(),
@@ -100,8 +102,8 @@ def iterates(problem: NonlinearProblem, solver: NonlinearSolver, other: Nonlinea
     ledger = Ledger()
     tangent = Tangent(PLAIN, Never(), ledger)
     start = near(spin_flow(0.5), 0.52)
-    tangent.refresh_if_due(Audited(other, ledger).view, start)
-    states = solver.steps(Audited(problem, ledger).view, tangent.view, start)
+    tangent.refresh_if_due(lambda: other.jacobian(start))
+    states = solver.steps(CountedProblem(problem, ledger), tangent, start)
     return [next(states).state for _ in range(count + 1)]
 
 
@@ -301,7 +303,7 @@ def test_mixing_speeds_picard_up() -> None:
     assert counts[1] < 0.6 * counts[0]
 
 
-class Bare(SmallProblem):
+class Bare(ToyProblem):
     """A problem that offers no secant matrix."""
 
     secant = NonlinearProblem.secant  # type: ignore[assignment]
@@ -321,7 +323,7 @@ def test_pseudo_transient_steps_solve_the_damped_equation_with_a_shift_that_fall
     start, sizes = near(flow, 0.6), list[float]()
     ledger = Ledger()
     states = PseudoTransient(shift=shift).steps(
-        Audited(flow, ledger).view, Tangent(PLAIN, EveryIteration(), ledger).view, start
+        CountedProblem(flow, ledger), Tangent(PLAIN, EveryIteration(), ledger), start
     )
     for u, following in pairwise([next(states).state for _ in range(5)]):
         matrix, residual = flow.jacobian(u), flow.residual(u)
@@ -347,14 +349,14 @@ def test_the_augmented_matrix_solves_the_damped_least_squares(shift: float) -> N
     matrix = np.random.default_rng(0).standard_normal((12, 12)) * 10.0 ** np.linspace(-3.0, 3.0, 12)
     b = np.cos(np.arange(12.0))
 
-    class Linear(SmallProblem):
+    class Linear(ToyProblem):
         def jacobian(self, u: Any) -> Any:
             return csr_array(matrix)
 
     ledger = Ledger()
-    augmented = Audited(Linear(), ledger).view.jacobian(b).augmented(shift)
-    factors = factorize_counted(DenseLU(), augmented, None, ledger)
-    r, w = np.split(factors.solve(np.concatenate([b, np.zeros(12)])), 2)
+    tangent = Tangent(DenseLU(), None, ledger)
+    tangent.refresh_if_due(lambda: augmented(CountedProblem(Linear(), ledger).jacobian(b), shift))
+    r, w = np.split(tangent.solve(np.concatenate([b, np.zeros(12)])), 2)
     damping = np.diag(np.sqrt(shift) * np.linalg.norm(matrix, axis=0))
     expected = np.linalg.lstsq(np.vstack([matrix, damping]), np.concatenate([b, np.zeros(12)]))[0]
     np.testing.assert_allclose(w, expected, rtol=1e-8)
@@ -363,7 +365,7 @@ def test_the_augmented_matrix_solves_the_damped_least_squares(shift: float) -> N
 
 
 def test_levenberg_marquardts_first_step_solves_the_damped_normal_equations() -> None:
-    problem = SmallProblem()
+    problem = ToyProblem()
     outcome, _ = run(problem, LevenbergMarquardt(shift=0.5), EveryIteration(), START, DenseLU(), iterations=1)
     matrix, residual = problem.jacobian(START).toarray(), problem.residual(START)
     normal = matrix.T @ matrix + 0.5 * np.diag((matrix**2).sum(axis=0))
@@ -372,8 +374,8 @@ def test_levenberg_marquardts_first_step_solves_the_damped_normal_equations() ->
 
 def test_the_residual_falls_at_each_step_of_levenberg_and_marquardt_from_afar() -> None:
     """And a refused step costs a matrix and a residual, and no row."""
-    far = SmallProblem.solution + 8.0 * np.cos(np.arange(12.0))
-    outcome, ledger = run(SmallProblem(), LevenbergMarquardt(), EveryIteration(), far, DenseLU())
+    far = ToyProblem.solution + 8.0 * np.cos(np.arange(12.0))
+    outcome, ledger = run(ToyProblem(), LevenbergMarquardt(), EveryIteration(), far, DenseLU())
     assert outcome.status is Status.CONVERGED
     assert (np.diff([row["residual_norm"] for row in outcome.steps]) < 0.0).all()
     assert ledger.counts["factorization"] == ledger.counts["residual"] - 1 >= len(outcome.steps) - 1
@@ -382,7 +384,7 @@ def test_the_residual_falls_at_each_step_of_levenberg_and_marquardt_from_afar() 
 def test_a_step_is_refused_until_it_is_short_enough() -> None:
     """F = arctan u from u = 3, where a full step ends at −9.5: ‖F‖ falls at once when enough is damped."""
 
-    class Arctan(SmallProblem):
+    class Arctan(ToyProblem):
         def residual(self, u: Any) -> Any:
             return np.arctan(u)
 
@@ -415,9 +417,9 @@ def test_the_dogleg_bends_at_the_cauchy_point_and_ends_at_the_chord() -> None:
 
 
 def test_the_cauchy_point_is_the_least_of_the_model_along_the_steepest_descent() -> None:
-    view = Audited(SmallProblem(), ledger := Ledger()).view
-    jacobian, residual = view.jacobian(START), view.residual(START)
-    matrix = SmallProblem().jacobian(START)
+    counted = CountedProblem(ToyProblem(), ledger := Ledger())
+    jacobian, residual = counted.jacobian(START), counted.residual(START)
+    matrix = ToyProblem().jacobian(START)
     point = cauchy_point(jacobian, residual)
     assert ledger.counts["matrix_product"] == 2
     assert abs((residual + matrix @ point) @ (matrix @ point)) <= 1e-12 * (residual @ residual)
@@ -435,8 +437,8 @@ def test_in_a_wide_region_the_trust_region_method_is_modified_newton() -> None:
 
 
 def test_the_residual_falls_at_each_step_of_a_trust_region_method_from_afar() -> None:
-    far = SmallProblem.solution + 8.0 * np.cos(np.arange(12.0))
-    outcome, _ = run(SmallProblem(), TrustRegion(), EveryIteration(), far, DenseLU())
+    far = ToyProblem.solution + 8.0 * np.cos(np.arange(12.0))
+    outcome, _ = run(ToyProblem(), TrustRegion(), EveryIteration(), far, DenseLU())
     assert outcome.status is Status.CONVERGED
     assert (np.diff([row["residual_norm"] for row in outcome.steps]) < 0.0).all()
 
@@ -454,9 +456,9 @@ def test_cost_optimal_weighs_iterations_against_a_factorisation() -> None:
     """d = 10, ratio 10, θ_new = 0.1: 20 iterations are worth it, which is θ = 10^(−1/2)."""
     rule = CostOptimal(ratio=10.0, digits=10.0, fresh=0.1)
     check_refresh_rule(rule)
-    dues = [rule.due(Evidence(contraction=c)) for c in (None, 0.0, 0.3, 0.33, 1.0, float("nan"))]
+    dues = [rule.due(TangentHistory(contraction=c)) for c in (None, 0.0, 0.3, 0.33, 1.0, float("nan"))]
     assert dues == [False, False, False, True, True, True]
-    assert not rule.with_(ratio=1000.0).due(Evidence(contraction=0.9))
+    assert not rule.with_(ratio=1000.0).due(TangentHistory(contraction=0.9))
 
 
 def test_average_cost_renews_where_the_average_is_least() -> None:
@@ -466,32 +468,32 @@ def test_average_cost_renews_where_the_average_is_least() -> None:
         check_refresh_rule(rule)
         gains = 1.0 - 0.002 * np.arange(400.0)  # digits of the solves
         average = (cost + np.arange(1.0, 401.0)) / np.cumsum(gains)
-        evidence = [
-            Evidence(contraction=10.0**-gain, solves=n, digits=float(digits), rate=gain)
+        histories = [
+            TangentHistory(contraction=10.0**-gain, solves=n, digits=float(digits), rate=gain)
             for n, gain, digits in zip(range(1, 401), gains, np.cumsum(gains), strict=True)
         ]
-        dues = [rule.due(each) for each in evidence]
+        dues = [rule.due(each) for each in histories]
         assert abs(dues.index(True) - int(average.argmin())) <= 1
         assert all(dues[dues.index(True) :])
-    assert not rule.due(Evidence())
-    assert rule.due(Evidence(contraction=0.5, solves=3, digits=-1.0, rate=-1.0))  # it has made things worse
-    assert rule.due(Evidence(contraction=1.0, solves=3, digits=9.0, rate=3.0))
+    assert not rule.due(TangentHistory())
+    assert rule.due(TangentHistory(contraction=0.5, solves=3, digits=-1.0, rate=-1.0))  # it has made things worse
+    assert rule.due(TangentHistory(contraction=1.0, solves=3, digits=9.0, rate=3.0))
 
 
 def test_digits_and_solves_are_counted_for_each_tangent() -> None:
     """Three solves of contraction 0.1 a solve, then one of 0.01: five digits; and a new tangent begins at none."""
-    tangent, view = Tangent(DenseLU(), EveryM(m=2), Ledger()), Audited(SmallProblem(), Ledger()).view
-    tangent.refresh_if_due(view, START)
+    tangent, jacobian = Tangent(DenseLU(), EveryM(m=2), Ledger()), ToyProblem().jacobian(START)
+    tangent.refresh_if_due(lambda: jacobian)
     for solves, contraction in ((3, 0.1), (1, 0.01)):
         for _ in range(solves):
             tangent.solve(START)
         tangent.observe(contraction=contraction)
-    assert (tangent.evidence.solves, tangent.evidence.digits) == (4, pytest.approx(5.0))
-    assert tangent.evidence.rate == pytest.approx(1.0 + (1.0 - np.exp(-0.1)))
-    tangent.refresh_if_due(view, START)
-    assert tangent.evidence.solves == 4
-    tangent.refresh_if_due(view, START)
-    assert (tangent.evidence.solves, tangent.evidence.digits) == (0, 0.0)
+    assert (tangent.history.solves, tangent.history.digits) == (4, pytest.approx(5.0))
+    assert tangent.history.rate == pytest.approx(1.0 + (1.0 - np.exp(-0.1)))
+    tangent.refresh_if_due(lambda: jacobian)
+    assert tangent.history.solves == 4
+    tangent.refresh_if_due(lambda: jacobian)
+    assert (tangent.history.solves, tangent.history.digits) == (0, 0.0)
 
 
 @pytest.mark.parametrize("solver", [ModifiedNewton(), Broyden(), Anderson(), NewtonKrylov()], ids=name)
@@ -513,12 +515,12 @@ def test_scipys_work_is_in_the_ledger() -> None:
 
 
 def test_without_a_preconditioner_scipy_never_asks_for_a_matrix() -> None:
-    outcome, ledger = run(SmallProblem(), ScipyRoot(method="krylov", precondition=False), None, START, DenseLU())
+    outcome, ledger = run(ToyProblem(), ScipyRoot(method="krylov", precondition=False), None, START, DenseLU())
     assert outcome.status is Status.CONVERGED
     assert ledger.counts["jacobian"] == ledger.counts["triangular_solve"] == 0
 
 
-class Constant(SmallProblem):
+class Constant(ToyProblem):
     """A residual that nothing changes."""
 
     def residual(self, u: Any) -> Any:

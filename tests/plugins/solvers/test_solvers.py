@@ -15,12 +15,13 @@ from nlsolve_solvers.modified_newton import ModifiedNewton
 from pydantic import ValidationError
 
 from nlsolve import Status
-from nlsolve.plugin import Evidence, NonlinearSolver, RefreshRule
-from nlsolve.solving.ledger import Audited, Ledger
+from nlsolve.plugin import NonlinearSolver, RefreshRule, TangentHistory
+from nlsolve.solving.counted_problem import CountedProblem
+from nlsolve.solving.ledger import Ledger
 from nlsolve.solving.stopping import StoppingTest
 from nlsolve.solving.tangent import Tangent
 from nlsolve.testing import check_linear_solver, check_refresh_rule, check_solver
-from nlsolve.testing.toy_problem import DenseLU, SmallProblem
+from nlsolve.testing.toy_problem import DenseLU, ToyProblem
 
 RULES: tuple[RefreshRule, ...] = (EveryIteration(), EveryM(), EveryM(m=2), PoorContraction(), RangeUnderOne(), Never())
 SOLVERS: tuple[NonlinearSolver, ...] = (
@@ -31,7 +32,7 @@ SOLVERS: tuple[NonlinearSolver, ...] = (
     AsymptoticNumericalMethod(order=5, tolerance=1e-4),
     AsymptoticNumericalMethod(order=3, tolerance=0.5),
 )
-START = SmallProblem.solution + 0.5 * np.cos(np.arange(12.0))
+START = ToyProblem.solution + 0.5 * np.cos(np.arange(12.0))
 
 
 def name(component: Any) -> str:
@@ -93,47 +94,45 @@ def test_auto_keeps_the_sparsest_ordering_and_lends_it() -> None:
 
 
 def test_rules_say_what_their_names_say() -> None:
-    assert EveryIteration().due(Evidence())
-    assert [EveryM(m=3).due(Evidence(uses=uses)) for uses in (1, 2, 3, 4)] == [False, False, True, True]
+    assert EveryIteration().due(TangentHistory())
+    assert [EveryM(m=3).due(TangentHistory(uses=uses)) for uses in (1, 2, 3, 4)] == [False, False, True, True]
     contractions = (None, 0.1, 0.5, 0.6, float("nan"))
-    assert [PoorContraction(limit=0.5).due(Evidence(contraction=c)) for c in contractions] == [
+    assert [PoorContraction(limit=0.5).due(TangentHistory(contraction=c)) for c in contractions] == [
         False,
         False,
         False,
         True,
         True,
     ]
-    assert [RangeUnderOne().due(Evidence(range=a)) for a in (None, 0.99, 1.0, float("nan"))] == [
+    assert [RangeUnderOne().due(TangentHistory(range=a)) for a in (None, 0.99, 1.0, float("nan"))] == [
         False,
         True,
         False,
         True,
     ]
-    assert not Never().due(Evidence(99, 1e9, 0.0))
+    assert not Never().due(TangentHistory(99, 1e9, 0.0))
 
 
 @pytest.mark.parametrize(("m", "expected"), [(1, 6), (2, 3), (3, 2), (6, 1)])
 def test_every_m_factorises_once_in_m_iterations(m: int, expected: int) -> None:
     stop = StoppingTest(tolerance=1e-300)
     _, ledger = run(
-        SmallProblem(), Newton(globalization={"kind": "none"}), EveryM(m=m), START, DenseLU(), stop, iterations=6
+        ToyProblem(), Newton(globalization={"kind": "none"}), EveryM(m=m), START, DenseLU(), stop, iterations=6
     )
     assert ledger.counts["factorization"] == expected
 
 
 def test_a_tangent_outlives_the_solve_it_was_made_in() -> None:
-    problem, ledger = SmallProblem(), Ledger()
-    tangent = Tangent(DenseLU(), Never(), ledger)
-    view = Audited(problem, ledger).view
-    assert tangent.view.refresh_if_due(view, START)
-    assert not tangent.view.refresh_if_due(view, SmallProblem.solution)
+    problem, tangent = ToyProblem(), Tangent(DenseLU(), Never(), Ledger())
+    assert tangent.refresh_if_due(lambda: problem.jacobian(START))
+    assert not tangent.refresh_if_due(lambda: problem.jacobian(ToyProblem.solution))
     assert tangent.branches == 1
 
 
 def test_modified_newton_is_newton_but_for_its_rule() -> None:
     for rule in RULES:
-        one, _ = run(SmallProblem(), Newton(), rule, START, DenseLU())
-        other, _ = run(SmallProblem(), ModifiedNewton(), rule, START, DenseLU())
+        one, _ = run(ToyProblem(), Newton(), rule, START, DenseLU())
+        other, _ = run(ToyProblem(), ModifiedNewton(), rule, START, DenseLU())
         np.testing.assert_array_equal(one.state, other.state)
 
 
@@ -256,8 +255,8 @@ def test_on_a_linear_problem_homotopy_and_modified_newton_leave_the_same_residua
     ):
         ledger = Ledger()
         tangent = Tangent(PLAIN, Never(), ledger)
-        tangent.refresh_if_due(Audited(other, ledger).view, start)
-        states = solver.steps(Audited(flow, ledger).view, tangent.view, start)
+        tangent.refresh_if_due(lambda: other.jacobian(start))
+        states = solver.steps(CountedProblem(flow, ledger), tangent, start)
         left.append([next(states).state for _ in range(steps + 1)][-1])
     np.testing.assert_allclose(left[0], left[1], atol=1e-9 * np.abs(left[1]).max())
 
