@@ -12,7 +12,7 @@ from pydantic import Field
 from nlsolve.contracts.component import Component
 
 
-class PaperValues(Component):
+class PublishedValues(Component):
     """What a paper reports for the cells of a table, in the table's own order of rows and columns."""
 
     noun: ClassVar[str] = "paper"

@@ -10,7 +10,7 @@ import pandas as pd
 from nlsolve.contracts.status import SolveError
 from nlsolve.flow.setup import Setup
 from nlsolve.results.columns import DIAGNOSTICS
-from nlsolve.results.verdicts import names_settings
+from nlsolve.results.parameters import names_settings
 from nlsolve.study.study import Study
 
 NO_CLOUD = "a system of equations has no cloud, and no operators on it"

@@ -66,7 +66,7 @@ def solve(
         rows.append(
             {
                 "step": number,
-                "branch": tangent.branches,
+                "tangents": tangent.branches,
                 "triangular_solves": ledger.counts["triangular_solve"],
                 "residual_norm": residual_norm,
                 "difference": difference,

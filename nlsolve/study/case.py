@@ -17,7 +17,7 @@ from nlsolve.flow.continuation import LOAD, Start
 from nlsolve.flow.setup import Setup
 from nlsolve.registry.problems import ABSENT, Problem, problems_in
 from nlsolve.registry.registry import CONTRACTS, Registry
-from nlsolve.results.verdicts import names_settings
+from nlsolve.results.parameters import names_settings
 from nlsolve.solving.stopping import Budget, StoppingTest
 from nlsolve.study.sweeps import Document, Point, leaves
 

@@ -15,8 +15,9 @@ from matplotlib.lines import Line2D
 from pydantic import TypeAdapter, ValidationError
 from scipy.stats import binom
 
+from nlsolve.results.parameters import differing_parameters
 from nlsolve.results.profiles import band, ratios, wilson, within
-from nlsolve.results.verdicts import solved, telling
+from nlsolve.results.verdicts import solved
 from nlsolve.show.figures import BaseFigure, FigureError, FigureSpec, draw
 
 ADAPTER: TypeAdapter[BaseFigure] = TypeAdapter(FigureSpec)
@@ -290,8 +291,8 @@ def test_names_of_settings_settle_what_they_assign() -> None:
             "record": ["[]", "[]", "[]", "[1.0]"],
         }
     )
-    assert telling(frame) == ["strategy", "trial"]
-    assert telling(pd.concat([frame, frame]).assign(**{"start.seed": [0] * 4 + [1] * 4})) == [
+    assert differing_parameters(frame) == ["strategy", "trial"]
+    assert differing_parameters(pd.concat([frame, frame]).assign(**{"start.seed": [0] * 4 + [1] * 4})) == [
         "strategy",
         "trial",
         "start.seed",

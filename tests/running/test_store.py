@@ -21,7 +21,7 @@ def study(tmp_path) -> Study:
 
 def part(study: Study, number: int = 0, **run) -> Part:
     case = study.cases[number]
-    row = {"case": case.id, "status": "converged", "message": "", "branches": 3, **run, **case.parameters}
+    row = {"case": case.id, "status": "converged", "message": "", "tangents": 3, **run, **case.parameters}
     return Part(
         row, pd.DataFrame({"case": case.id, "range": [1.0, None]}), pd.DataFrame({"case": [case.id], "u": [1.0]})
     )
@@ -122,6 +122,6 @@ def test_files_and_mixed_parameters(tmp_path, study):
         "fields.parquet",
     }
     assert pd.read_parquet(folder / "runs.parquet")["odd"].tolist()[:2] == ["1", "one"]
-    assert pd.read_csv(folder / "runs.csv")["branches"].tolist() == [3, 3, 3]
+    assert pd.read_csv(folder / "runs.csv")["tangents"].tolist() == [3, 3, 3]
     specs, runs = read_tables(folder)
     assert (specs[0].name, len(runs)) == ("branches", 3)

@@ -312,8 +312,8 @@ class TestComplaints:
         assert "line 13: start.by = 'idx': the law 'honey' has no such field; it has index" in message
 
     def test_tables_name_columns_that_exist(self, tmp_path):
-        message = complaint(tmp_path, ('value = "branches"', 'value = "brnches"'))
-        assert "line 22: table[0].value = 'brnches': no such column of the results; did you mean 'branches'?" in message
+        message = complaint(tmp_path, ('value = "tangents"', 'value = "tangnts"'))
+        assert "line 22: table[0].value = 'tangnts': no such column of the results; did you mean 'tangents'?" in message
         message = complaint(tmp_path, ('rows = "solver.order"', 'rows = "solver.ordr"'))
         assert "line 20: table[0].rows = 'solver.ordr'" in message
 

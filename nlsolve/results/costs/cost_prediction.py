@@ -11,10 +11,22 @@ import pandas as pd
 from nlsolve.results.aggregates import grouped
 from nlsolve.results.columns import RUNS
 from nlsolve.results.costs.unit_costs import COUNTS, PREFIX, UnitCosts
+from nlsolve.results.frames import rows_of
 from nlsolve.results.verdicts import Run, number
 
-PROBLEM = ("scene", "law", "discretizer", "linear")
-"""Sections whose parameters settle what a unit of work costs."""
+OF_THE_METHOD = (
+    "solver",
+    "refresh",
+    "predictor",
+    "stop",
+    "budget",
+    "start",
+    "starter",
+    "record",
+    "counterpart",
+    "error_estimator",
+)
+"""Sections that do not change what a unit of work costs; all others do."""
 
 UNITS = tuple(name for name in RUNS if name.startswith(PREFIX))
 
@@ -29,14 +41,13 @@ def with_predictions(runs: pd.DataFrame) -> pd.DataFrame:
     if not any(name in runs and runs[name].notna().any() for name in UNITS):
         return runs
     parameters = [name for name in map(str, runs.columns) if name not in RUNS and "." in name]
-    of_cell = [name for name in parameters if name.split(".")[0] in PROBLEM]
+    of_cell = [name for name in parameters if name.split(".")[0] not in OF_THE_METHOD]
     of_case = [name for name in parameters if name.split(".")[0] != "linear"]
-    records = [dict(zip(map(str, runs.columns), row, strict=True)) for row in runs.itertuples(index=False)]
-    records = [{**run, "cell": _key(of_cell, run), "same case": _key(of_case, run)} for run in records]
-    units = {cell: pooled(members) for (cell,), members in grouped(records, ("cell",)).items()}
-    rivals = grouped(records, ("same case",))
+    rows = [{**run, "cell": _key(of_cell, run), "same case": _key(of_case, run)} for run in rows_of(runs)]
+    units = {cell: pooled(members) for (cell,), members in grouped(rows, ("cell",)).items()}
+    rivals = grouped(rows, ("same case",))
     seconds = []
-    for run in records:
+    for run in rows:
         unit = units[run["cell"]]
         others = [other for other in rivals[(run["same case"],)] if other["cell"] != run["cell"]]
         own = [

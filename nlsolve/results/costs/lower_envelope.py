@@ -12,7 +12,7 @@ Interval = tuple[int, float, float]
 """Position of a line, and from where to where it is the lowest."""
 
 
-def envelope(slopes: Sequence[float] | Array, rests: Sequence[float] | Array) -> list[Interval]:
+def lower_envelope(slopes: Sequence[float] | Array, rests: Sequence[float] | Array) -> list[Interval]:
     """Which of the lines is lowest for 0 ≤ ρ < ∞, from left to right; of equals the first."""
     a, b = np.asarray(slopes, dtype=float), np.asarray(rests, dtype=float)
     here, low = int(np.lexsort((a, b))[0]), 0.0

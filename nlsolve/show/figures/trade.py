@@ -14,11 +14,14 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from nlsolve.contracts.status import Status
-from nlsolve.results.frames import Frames
-from nlsolve.results.verdicts import Run, cheapest, doubt, is_error, number, percent, telling
-from nlsolve.show.figures.base import BaseFigure, Names
-from nlsolve.show.figures.cases import label_of, labelled, records_of, select
-from nlsolve.show.figures.style import ACCENT, COLOURS, IN_DOUBT, MARKERS, PAGE, axis_label, join, legend_outside, unit
+from nlsolve.results.columns import RUNS
+from nlsolve.results.frames import Frames, rows_of
+from nlsolve.results.parameters import differing_parameters
+from nlsolve.results.selection import Names
+from nlsolve.results.verdicts import Run, cheapest, doubt, is_error, number, percent
+from nlsolve.show.figures.base import BaseFigure
+from nlsolve.show.figures.cases import label_of, labelled, select
+from nlsolve.show.figures.style import ACCENT, COLOURS, IN_DOUBT, MARKERS, PAGE, axis_label, join, legend_outside
 
 FRONT = "no run is cheaper and better"
 
@@ -43,7 +46,7 @@ class TradeFigure(BaseFigure):
         for column in (self.x, self.y):
             self.require(column, frames.runs, "runs")
         chosen = select(self, frames.runs)
-        converged = chosen[chosen["status"] == Status.CONVERGED.word]
+        converged = chosen[[status is Status.CONVERGED for status in chosen["status"].map(Status.of)]]
         cost, error = (converged[name].map(number).to_numpy(float) for name in (self.x, self.y))
         runs = converged[(cost > 0) & (error > 0) & np.isfinite(cost + error)]
         if runs.empty:
@@ -96,11 +99,10 @@ class TradeFigure(BaseFigure):
 
     def _winners(self, axes: Axes, runs: pd.DataFrame) -> list[Any]:
         """Rings, target lines, and the names of the winners."""
-        records = records_of(runs)
-        words = telling(runs)
+        candidates, words = rows_of(runs), differing_parameters(runs)
         handles = []
         for place, target in enumerate(self.targets):
-            best = cheapest(records, self.x, self.y, target)
+            best = cheapest(candidates, self.x, self.y, target)
             ring: Any = {"linestyle": "none", "marker": "o", "markerfacecolor": "none", "markeredgecolor": ACCENT}
             ring |= {"markersize": 9 + 3 * place, "markeredgewidth": 1.1, "zorder": 4}
             goal = percent(target) if is_error(self.y) else f"{target:g}"
@@ -114,7 +116,8 @@ class TradeFigure(BaseFigure):
 
     def _name(self, run: Run, words: Sequence[str]) -> str:
         """ "mls, graded-rings, first 0.05, 0.42 s"."""
-        price = f"{float(run[self.x]):.2g} {unit(self.x, 'runs').strip('[]')}".strip()
+        unit = RUNS[self.x].unit if self.x in RUNS else ""
+        price = f"{float(run[self.x]):.2g} {unit}".strip()
         return join(label_of({name: run[name] for name in words}), price, "in doubt" if doubt(run) else "")
 
     def _left_out(self, chosen: pd.DataFrame, converged: pd.DataFrame, runs: pd.DataFrame) -> list[str]:
