@@ -99,6 +99,18 @@ def test_a_band_is_the_binomial_one() -> None:
     assert wide[0] < low < high < wide[1]
 
 
+def test_of_a_single_problem_nothing_can_be_drawn_anew() -> None:
+    low, high = band(np.array([[3.0], [INF]]), np.array([1.0, 4.0]), 0.9, 100, 0)
+    assert low.tolist() == high.tolist() == [[0.0, 1.0], [0.0, 0.0]]
+
+
+def test_all_strategies_are_given_the_same_draws() -> None:
+    cost = np.random.default_rng(1).lognormal(size=12)
+    low, high = band(np.stack([cost, cost]), np.array([0.5, 1.0, 2.0]), 0.9, 100, 0)
+    np.testing.assert_array_equal(low[0], low[1])
+    np.testing.assert_array_equal(high[0], high[1])
+
+
 def test_wilsons_interval() -> None:
     """Both ends p solve |s/N − p| = z √(p (1 − p)/N). Newcombe's example (1998): 81 of 263, 95 %: 0.2553, 0.3662."""
     np.testing.assert_allclose(wilson(81, 263, 0.95), (0.2553, 0.3662), atol=5e-5)

@@ -78,6 +78,15 @@ def test_another_study_or_other_settings(tmp_path, study):
     assert json.loads((tmp_path / "out" / "study.json").read_text())["tables"][0]["name"] == "b"
 
 
+@pytest.mark.parametrize("status", ["crashed", "not applicable", "condensed"])
+def test_a_part_without_a_usable_ending_is_computed_again(tmp_path, study, status):
+    store = Store(tmp_path / "out", study)
+    store.save(part(study, 0))
+    assert store.load(study.cases[0].id) is not None
+    store.save(part(study, 0, status=status))
+    assert store.load(study.cases[0].id) is None
+
+
 def test_a_folder_that_cannot_be_written(tmp_path, study):
     (tmp_path / "file").write_text("")
     with pytest.raises(

@@ -362,6 +362,9 @@ def test_pyplot_and_its_global_state_are_never_loaded() -> None:
     [
         ({"kind": "line", "y": "rnage"}, r"column 'rnage' is not in `steps`; the nearest are range"),
         ({"kind": "line", "source": "runs", "x": "zzz", "y": "tangents"}, r"'zzz' is not in `runs`; there are case"),
+        ({"kind": "line", "y": "branch"}, r"column 'branch': this column is called tangents now$"),
+        ({"kind": "map", "x": "case", "y": "case", "value": "branches"}, r"this column is called tangents now$"),
+        ({"kind": "line", "y": "range", "where": {"said_failed_but_is": 0}}, r"is called false_failure now$"),
         (
             {"kind": "line", "y": "range", "where": {"solver.ordr": 20}},
             r"where 'solver.ordr' .* nearest are solver.order",

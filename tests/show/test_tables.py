@@ -82,6 +82,8 @@ def test_several_runs_in_one_cell():
 def test_unknown_names():
     with pytest.raises(StudyError, match=r"table 't': value = 'tangens': no such .*; did you mean 'tangents'"):
         build(spec(value="tangens"), runs())
+    with pytest.raises(StudyError, match=r"^table 't': value = 'branches': this column is called tangents now$"):
+        build(spec(value="branches"), runs())
     with pytest.raises(StudyError, match=r"no case has these values: solver\.order = 11"):
         build(spec(where={"solver.order": 11}), runs())
 

@@ -317,6 +317,13 @@ class TestComplaints:
         message = complaint(tmp_path, ('rows = "solver.order"', 'rows = "solver.ordr"'))
         assert "line 20: table[0].rows = 'solver.ordr'" in message
 
+    def test_an_old_column_is_answered_with_its_new_name(self, tmp_path):
+        message = complaint(tmp_path, ('value = "tangents"', 'value = "branches"'))
+        assert message.endswith("line 22: table[0].value = 'branches': this column is called tangents now")
+        figure = '[[figure]]\nkind = "line"\nname = "f"\nsource = "runs"\nx = "solver.order"\ny = "branches"\n[quick]'
+        message = complaint(tmp_path, ("[quick]", figure))
+        assert message.endswith("figure[0].y = 'branches': this column is called tangents now")
+
     def test_a_cell_with_several_runs_is_seen_before_anything_is_run(self, tmp_path):
         message = complaint(tmp_path, ('columns = "solver.tolerance"\n', ""))
         assert "several runs land in the cell solver.order = 10; they differ in 'solver.tolerance'" in message
