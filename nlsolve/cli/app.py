@@ -1,4 +1,4 @@
-"""The command line: run, validate, plan, diagnose, plugins, table. Data on standard output, all else on error."""
+"""The commands of the command line: run, validate, plan, diagnose, plugins, table."""
 
 from __future__ import annotations
 

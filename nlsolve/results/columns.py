@@ -1,4 +1,4 @@
-"""The columns of the result frames, each with its meaning, unit and symbol: the one description of what is measured."""
+"""The columns of the result frames, each with its meaning, unit and symbol."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ REPORTED = _by_name(
     Column("reported_factorizations", "set-ups of its preconditioner, here K*, that it says it asked for"),
     Column("reported_triangular_solves", "solves with its preconditioner that it says it asked for"),
 )
-"""What a library says of its own work, to be held against the counts beside it; NaN where it says nothing."""
+"""What a library reports of its own work, to compare with what the ledger counts; NaN where it reports nothing."""
 
 RUNS = _by_name(
     Column("case", "identity of the case: a digest of its validated components"),
@@ -286,7 +286,7 @@ RENAMED: Mapping[str, str] = MappingProxyType(
 
 
 def no_such_column(name: str, known: Iterable[str]) -> str:
-    """What to tell whoever asks for a column that is not there: its new name, or the nearest of those `known`."""
+    """The sentence for a name that is no column: what the column is called now, or the nearest of the names `known`."""
     if name in RENAMED:
         return f"this column is called {RENAMED[name]} now"
     return f"no such column of the results; {did_you_mean(name, known)}"

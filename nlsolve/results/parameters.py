@@ -21,7 +21,7 @@ def names_settings(column: str) -> bool:
 
 
 def differing_parameters(runs: pd.DataFrame) -> list[str]:
-    """Parameters that are not the same in all runs, without those that the names of the runs' settings settle."""
+    """Parameters whose values differ between the runs, without those that follow from the names of settings."""
     words = {str(name): [str(value) for value in runs[name]] for name in runs if name not in RUNS}
     differing = [name for name, values in words.items() if len(set(values)) > 1]
     names = [name for name in differing if names_settings(name)]

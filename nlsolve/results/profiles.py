@@ -1,4 +1,4 @@
-"""Share of problems solved, within what cost, and how certain it is. A failure costs ∞, and stays in every share."""
+"""The share of problems that a strategy solves within a cost, and how certain it is. A failure costs ∞."""
 
 from __future__ import annotations
 

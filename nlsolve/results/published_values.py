@@ -13,7 +13,7 @@ from nlsolve.contracts.component import Component
 
 
 class PublishedValues(Component):
-    """What a paper reports for the cells of a table, in the table's own order of rows and columns."""
+    """A paper's values for the cells of a table, in the table's order of rows and columns."""
 
     noun: ClassVar[str] = "paper"
 

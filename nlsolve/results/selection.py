@@ -1,4 +1,4 @@
-"""Which runs a table or a figure is about: `where = { "solver.kind" = ["newton", "anm"] }`."""
+"""The selection of runs for a table or a figure: `where = { "solver.kind" = ["newton", "anm"] }`."""
 
 from __future__ import annotations
 
@@ -24,10 +24,10 @@ CLOSE = 1e-9
 
 
 def same(a: Any, b: Any) -> bool:
-    """Whether two values of a result frame are equal: |a − b| ≤ CLOSE max(|a|, |b|) for numbers; no value equals none.
+    """|a − b| ≤ CLOSE max(|a|, |b|) for numbers, a = b for others: whether two values of a frame are equal.
 
-    A number equals a word that spells it: a column that holds numbers in some cases and words in others is stored as
-    words.
+    Missing values are equal. A number equals a word that spells it: a column that holds numbers in some cases and words
+    in others is stored as words.
     """
     if _missing(a) or _missing(b):
         return _missing(a) and _missing(b)

@@ -1,7 +1,4 @@
-"""What became of a run beyond its status: right, doubted or wrong; and which runs are worth their price.
-
-The one place where results are judged: tables and figures of `runs` ask here.
-"""
+"""Verdicts on runs: right, doubted or wrong; solved or not; the cheapest within an error."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A results folder: parts written whole as cases finish, merged into tidy files, and resumed by the same study only."""
+"""A results folder: the part of every finished case, tidy files of all of them, and the study that may resume it."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ TRIED_AGAIN = frozenset({Status.CRASHED, Status.NOT_APPLICABLE})
 
 
 class StoreError(ValueError):
-    """A results folder that cannot be used: one sentence with the way out."""
+    """A results folder cannot be used; the sentence says why, and what to do."""
 
 
 @dataclass(frozen=True)
@@ -77,7 +77,7 @@ class Store:
         return Part(run, steps, fields) if usable else None
 
     def save(self, part: Part) -> None:
-        """Keep a part. Its row is written last: a part with a row is complete."""
+        """Write a part. Its row is written last: a part with a row is complete."""
         case = part.run["case"]
         self._parquet(self._part(case, "fields"), part.fields)
         self._parquet(self._part(case, "steps"), part.steps)
@@ -147,7 +147,7 @@ def _read_study(folder: Path) -> dict[str, Any]:
 
 
 def _identity(study: Study) -> dict[str, Any]:
-    """What a folder remembers of its study; question and cases must agree for a run to resume."""
+    """The description of a study in its folder; a run resumes where question and cases are the same."""
     return {
         "name": study.name,
         "question": study.question,
@@ -162,7 +162,7 @@ def _stacked(frames: list[pd.DataFrame], columns: Iterable[str]) -> pd.DataFrame
 
 
 def _storable(frame: pd.DataFrame) -> pd.DataFrame:
-    """A parquet column has one type: where a parameter has numbers in some cases and words in others, all are words."""
+    """The frame with one type a column: a parameter with numbers in some cases and words in others becomes words."""
     mixed = []
     for name, column in frame.items():
         types = {type(value) for value in column.dropna()} if is_object_dtype(column) else set()

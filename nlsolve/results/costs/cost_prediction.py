@@ -1,4 +1,4 @@
-"""Predicted seconds of runs: their counts, unit costs measured beside them, and what other runs say of own work."""
+"""seconds = Σ_kind n_kind c_kind + own work : predicted seconds of runs, from their counts and measured unit costs."""
 
 from __future__ import annotations
 
@@ -35,8 +35,8 @@ def with_predictions(runs: pd.DataFrame) -> pd.DataFrame:
     """The runs with `seconds_predicted` filled in; NaN where no unit costs are known.
 
     Unit costs are medians over the runs of the same problem and linear solver. The method's own work in an iteration is
-    the median over the runs of the same case with other linear solvers, on which it does not depend; none is added
-    where there are none. So nothing is told from the seconds of the run itself.
+    the median over the runs of the same case with other linear solvers, on which it does not depend; it is left out
+    where there are none. So no prediction uses the seconds of the run itself.
     """
     if not any(name in runs and runs[name].notna().any() for name in UNITS):
         return runs

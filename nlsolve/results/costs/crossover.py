@@ -2,7 +2,7 @@
 
 At one number of nodes a strategy is a straight line: its counts do not depend on ρ, and `rest` (its solves, residuals,
 series, own work) is in the unit of the solve. The cheapest strategy by ρ is the lower envelope of these lines; the
-linear solvers measured are points on the ρ axis, and a cell is one of them at one number of nodes.
+measured linear solvers are points on the ρ axis, and a cell is one of them at one number of nodes.
 """
 
 from __future__ import annotations
@@ -51,12 +51,12 @@ class Cell:
 
     @property
     def winners(self) -> tuple[int, int]:
-        """Positions of the strategy predicted, and of the one measured, to be cheapest."""
+        """Positions of the cheapest strategy by prediction, and by measurement."""
         return int(self.predicted.argmin()), int(self.seconds.argmin())
 
     @property
     def verdict(self) -> str:
-        """SAME, TIE or OTHER; a tie when the fastest round of the one predicted is within the rounds of the winner."""
+        """SAME, TIE or OTHER. A tie: the predicted winner's fastest round is no slower than the winner's slowest."""
         predicted, measured = self.winners
         if predicted == measured:
             return SAME
@@ -69,7 +69,7 @@ class Cell:
 
 
 class Crossover(Component):
-    """Which columns of `runs` tell strategies, sizes and linear solvers apart, and which report is shown."""
+    """A report on the cheapest strategy, and the columns of `runs` that tell strategies, sizes and linear solvers apart."""
 
     noun: ClassVar[str] = "crossover"
 
@@ -84,17 +84,17 @@ class Crossover(Component):
     against: str | None = Field(None, description="lines: a strategy that the others are compared with")
 
     def columns_of_runs(self) -> dict[str, tuple[str, ...]]:
-        """By field: the names of columns of `runs` that must be there."""
+        """Field -> the columns of `runs` that it names."""
         return {"strategy": self.strategy, "size": self.size, "backend": self.backend}
 
     @property
     def labels(self) -> tuple[str, ...]:
-        """Columns of the report that name its rows."""
+        """Columns of the report that tell its rows apart."""
         return ("size", "backend" if self.report == "cells" else "strategy")
 
     @property
     def shown(self) -> tuple[str, ...]:
-        """Columns of the report that hold its findings."""
+        """Columns of the report that hold its results."""
         if self.report == "cells":
             return ("ratio", "predicted", "measured", "verdict", "regret", "deviation", "spread")
         return ("factorizations", "rest", "wins", "at best", *([f"beats {self.against}"] if self.against else []))
@@ -105,9 +105,9 @@ class Crossover(Component):
         return _cell_rows(cells) if self.report == "cells" else self._line_rows(cells)
 
     def cells(self, runs: Sequence[Run]) -> list[Cell]:
-        """All cells of the converged runs that have unit costs.
+        """The cells of the converged runs that have unit costs.
 
-        StudyError when there are none, or when two runs are one strategy of a cell.
+        Raises StudyError when there are none, or when a cell has two runs of one strategy.
         """
         known = [run for run in runs if status_of(run) is Status.CONVERGED and number(run.get("seconds_predicted")) > 0]
         if not known:
@@ -162,7 +162,7 @@ def reference_cells(cells: Sequence[Cell]) -> list[Cell]:
 
 
 def by_size(cells: Sequence[Cell]) -> dict[str, list[Cell]]:
-    """The cells of each size, in their order."""
+    """Size -> its cells, in order of appearance."""
     sizes: dict[str, list[Cell]] = {}
     for cell in cells:
         sizes.setdefault(cell.size, []).append(cell)

@@ -1,4 +1,4 @@
-"""What all kinds of figures have in common: the declaration, the frames they draw from, and how they refuse."""
+"""The base of all kinds of figures: name, caption, selection of runs, and the error when nothing can be drawn."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ class BaseFigure(Component, ABC):
         return FigureError(f'figure "{self.name}": {sentence}')
 
     def require(self, column: str, frame: pd.DataFrame, source: str, what: str = "column") -> None:
-        """Refuse when the frame called `source` has no such column."""
+        """Raise FigureError when the frame called `source` has no such column."""
         if column in frame:
             return
         if column in RENAMED:

@@ -90,7 +90,7 @@ class LineFigure(BaseFigure):
         return points.sort_values(self.x, kind="stable") if sort else points
 
     def _cross_out(self, axes: Axes, points: pd.DataFrame, column: str) -> None:
-        """A cross on the runs that did not converge."""
+        """Mark the runs that did not converge with a cross."""
         if self.source == "steps" or "status" not in points or "status" in (self.x, column):
             return
         failed = points[[status is not Status.CONVERGED for status in points["status"].map(Status.of)]]
@@ -99,7 +99,7 @@ class LineFigure(BaseFigure):
             axes.plot(failed[self.x], failed[column], "x", markersize=6, color=ACCENT, zorder=5, label=label)
 
     def _nothing(self, column: str, frame: pd.DataFrame, groups: Sequence[pd.DataFrame]) -> str:
-        """Why there is nothing to draw, and what could be drawn instead."""
+        """The sentence for a column without numbers to draw, with the columns that have some."""
         kept = "accepted steps" if self.source == "steps" and self.accepted_only else self.source
         rows = pd.concat(list(groups)) if groups else frame.iloc[:0]
         if rows.empty:

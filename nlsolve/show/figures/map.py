@@ -1,4 +1,4 @@
-"""A value of every run in a grid of cells, and what became of the run: right, doubted, wrong, or failed how."""
+"""A value of every run in a grid, with marks on the runs that failed, are in doubt, or are wrong without a doubt."""
 
 from __future__ import annotations
 
@@ -126,7 +126,7 @@ class MapFigure(BaseFigure):
         return Tile(column, row, number(run[self.value]), status_of(run), bool(doubt(run)), wrong)
 
     def _norm(self, tiles: Sequence[Tile]) -> LogNorm | None:
-        """Colours from the least to the largest number of converged runs, of errors to 100 %; None without any."""
+        """The colour scale: least to largest number of the converged runs, errors up to 100 %; None without numbers."""
         converged = [tile.value for tile in tiles if not tile.failed]
         numbers = [value for value in converged if np.isfinite(value) and value > 0]
         if converged and not numbers:
@@ -215,7 +215,7 @@ class MapFigure(BaseFigure):
         bar.outline.set_linewidth(0.5)
 
     def _legend(self, figure: Figure, tiles: Sequence[Tile]) -> None:
-        """What the marks mean: only those that are there."""
+        """A legend of the marks that occur."""
         handles: list[Any] = []
         wrong = [tile for tile in tiles if tile.wrong]
         if wrong:
@@ -241,7 +241,7 @@ def code(status: Status) -> str:
 
 
 def short(value: float, column: str) -> str:
-    """Two digits: errors in percent from 0.01 % to 1000 %; 3e-5 and 2e4 for what is very small or large."""
+    """A number in two digits: errors from 0.01 % to 1000 % in percent, very small and large ones as 3e-5 and 2e4."""
     if not np.isfinite(value):
         return NO_NUMBER
     if is_error(column) and 1e-4 <= value < 10:

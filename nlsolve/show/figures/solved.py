@@ -1,4 +1,4 @@
-"""Which part of the problems each strategy solves, within what cost; what it does not solve stays in the count."""
+"""The share of the problems that each strategy solves, over the cost it is allowed: performance and data profiles."""
 
 from __future__ import annotations
 
@@ -72,7 +72,7 @@ class SolvedFigure(BaseFigure):
 
     @abstractmethod
     def abscissa(self, costs: Array) -> Array:
-        """What a share is taken of, shape (S, P): the costs themselves or something made of them."""
+        """The costs (S, P) in the unit of the horizontal axis."""
 
     @abstractmethod
     def words(self) -> str:
@@ -101,7 +101,7 @@ class SolvedFigure(BaseFigure):
         axes.set_title(join(self.title, nobody))
 
     def costs(self, runs: pd.DataFrame) -> Costs:
-        """The cost of every strategy for every problem; refused unless each has run each once."""
+        """The cost of every strategy for every problem. Raises FigureError unless each has run each problem once."""
         groups = labelled(self, runs, one_case=False)
         problem = self.problem or _problem_columns(runs, self.group)
         tables = [self._by_problem(label, members, problem) for label, members in groups]
@@ -132,7 +132,7 @@ class SolvedFigure(BaseFigure):
         return table
 
     def _cost(self, run: Run) -> float:
-        """Σ weight · column; ∞ for what is not solved."""
+        """Σ weight · column; ∞ for a run that is not solved."""
         if not solved(run, self.accepted, self.error):
             return np.inf
         total = sum(weight * number(run[column]) for column, weight in self.cost.items())
@@ -158,7 +158,7 @@ class SolvedFigure(BaseFigure):
                 axes.fill_between(places, low, high, **fill)
 
     def work(self) -> str:
-        """ "time inside the method", "triangular solves + 20 factorisations"."""
+        """The cost in words: "time inside the method", "triangular solves + 20 factorisations"."""
         weights = {column: "" if weight == 1 else f"{weight:g} " for column, weight in self.cost.items()}
         return " + ".join(weight + symbol(column, "runs") for column, weight in weights.items())
 
@@ -191,6 +191,6 @@ class DataFigure(SolvedFigure):
 
 
 def _problem_columns(runs: pd.DataFrame, group: Names) -> Names:
-    """Parameters that are not the same in all runs of a strategy."""
+    """Parameters that differ between the runs of one strategy: they tell its problems apart."""
     words = {str(name): [str(value) for value in runs[name]] for name in runs if name not in RUNS or name in group}
     return tuple(name for name in words if name not in group and not settled(words, name, group))

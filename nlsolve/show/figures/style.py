@@ -19,7 +19,6 @@ COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#0
 DASHES = ("-", "--", ":", "-.")
 MARKERS = ("o", "s", "^", "D", "v", "<", ">")
 UPPER, LOWER, ACCENT = COLOURS[0], COLOURS[4], "#C00000"
-SIGNED_MAP, POSITIVE_MAP = "RdBu_r", "viridis"
 ERROR_MAP = colormaps["YlGnBu"]
 FAILED = "not converged"  # last in every legend
 IN_DOUBT = "in doubt by its audits"
@@ -74,12 +73,12 @@ def axis_label(columns: Sequence[str], frame: str) -> str:
 
 
 def join(*parts: str | None) -> str:
-    """The parts that say something, with commas between."""
+    """The parts that are not empty, with commas between."""
     return ", ".join(filter(None, parts))
 
 
 def bracketed(label: str, note: str) -> str:
-    """A label and a note on it, or the one of them that says something."""
+    """A label with a note in brackets, or the one of them that is not empty."""
     return f"{label} ({note})" if label and note else label or note
 
 
@@ -97,7 +96,7 @@ def curve_style(number: int, points: int, markers: bool, dashes: str = "-") -> d
 
 
 def finish(figure: Figure, axes: Axes, title: str | None) -> None:
-    """Grid and title, and the legend above the axes, where it covers nothing."""
+    """Add grid, title, and a legend above the axes."""
     axes.grid(True, color="0.92", linewidth=0.5)
     axes.set_axisbelow(True)
     if title:
@@ -109,7 +108,7 @@ def finish(figure: Figure, axes: Axes, title: str | None) -> None:
 
 
 def legend_outside(figure: Figure, handles: Sequence[Any], labels: Sequence[str], edge: str = "upper") -> None:
-    """A legend at the edge of the paper, in as many columns as fit; the paper grows by the rows."""
+    """Add a legend at the edge of the paper, in as many columns as fit; the paper grows by its rows."""
     longest = max(map(letters, labels))
     width = figure.get_figwidth() / MILLIMETRE
     columns = max(1, min(len(labels), int((width - 4) // (1.35 * longest + 10))))
@@ -121,5 +120,5 @@ def legend_outside(figure: Figure, handles: Sequence[Any], labels: Sequence[str]
 
 
 def letters(label: str) -> int:
-    """Letters of a label on paper, without those of its mathematics."""
+    """How many letters of a label are printed, without the commands of its mathematics."""
     return len(re.sub(r"\\[a-z]+|[${}_^]", "", label))

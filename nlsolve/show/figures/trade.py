@@ -1,4 +1,4 @@
-"""What accuracy costs: error over cost of every run, the front nobody beats, and the cheapest run for each target."""
+"""Error over cost of every run, the front of runs that none beats in both, and the cheapest run for each target."""
 
 from __future__ import annotations
 
@@ -10,7 +10,6 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from numpy.typing import NDArray
 from pydantic import Field
 
 from nlsolve.contracts.status import Status
@@ -19,6 +18,7 @@ from nlsolve.results.frames import Frames, rows_of
 from nlsolve.results.parameters import differing_parameters
 from nlsolve.results.selection import Names
 from nlsolve.results.verdicts import Run, cheapest, doubt, is_error, number, percent
+from nlsolve.series import Array
 from nlsolve.show.figures.base import BaseFigure
 from nlsolve.show.figures.cases import label_of, labelled, select
 from nlsolve.show.figures.style import ACCENT, COLOURS, IN_DOUBT, MARKERS, PAGE, axis_label, join, legend_outside
@@ -70,7 +70,7 @@ class TradeFigure(BaseFigure):
             legend_outside(figure, winners, [str(handle.get_label()) for handle in winners], "lower")
 
     def _points(self, axes: Axes, runs: pd.DataFrame) -> list[Any]:
-        """Marks by group, and their entries of the legend."""
+        """Draw the marks by group; returns their entries of the legend."""
         handles: list[Any] = []
         doubted = runs.apply(lambda run: bool(doubt(run)), axis=1).to_numpy(bool)
         position = {case: place for place, case in enumerate(runs.index)}
@@ -98,7 +98,7 @@ class TradeFigure(BaseFigure):
         return handles
 
     def _winners(self, axes: Axes, runs: pd.DataFrame) -> list[Any]:
-        """Rings, target lines, and the names of the winners."""
+        """Draw a ring and a line for each target; returns entries of the legend with the names of the cheapest runs."""
         candidates, words = rows_of(runs), differing_parameters(runs)
         handles = []
         for place, target in enumerate(self.targets):
@@ -115,13 +115,13 @@ class TradeFigure(BaseFigure):
         return handles
 
     def _name(self, run: Run, words: Sequence[str]) -> str:
-        """ "mls, graded-rings, first 0.05, 0.42 s"."""
+        """A run in words: "mls, graded-rings, first 0.05, 0.42 s"."""
         unit = RUNS[self.x].unit if self.x in RUNS else ""
         price = f"{float(run[self.x]):.2g} {unit}".strip()
         return join(label_of({name: run[name] for name in words}), price, "in doubt" if doubt(run) else "")
 
     def _left_out(self, chosen: pd.DataFrame, converged: pd.DataFrame, runs: pd.DataFrame) -> list[str]:
-        """How many runs are not drawn, and why."""
+        """Sentences on the runs that are not drawn."""
         failed, without = len(chosen) - len(converged), len(converged) - len(runs)
         return [
             f"{failed} of {len(chosen)} runs did not converge" if failed else "",
@@ -129,8 +129,8 @@ class TradeFigure(BaseFigure):
         ]
 
 
-def _front(cost: NDArray[np.float64], error: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """The runs that none beats in both: cost ascending, error descending; then on to the dearest run."""
+def _front(cost: Array, error: Array) -> tuple[Array, Array]:
+    """Cost and error of the runs that none beats in both, by rising cost; last, the same error at the largest cost."""
     order = np.lexsort((error, cost))
     cost, error = cost[order], error[order]
     best = np.minimum.accumulate(error)

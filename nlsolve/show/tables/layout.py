@@ -1,4 +1,4 @@
-"""Runs -> the cells of a declared table, and what keeps it from being laid out."""
+"""Runs -> the cells of a declared table, and the problems that prevent it."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def build(spec: TableSpec, runs: pd.DataFrame) -> Table:
 
 
 def check(spec: TableSpec, runs: Sequence[Run], measured: Iterable[str] = MEASURED) -> list[Problem]:
-    """What keeps a table from being laid out: unknown names, cells with several runs, a paper of another shape.
+    """The problems of a table: unknown names, cells with several runs, paper values of another shape.
 
     Works on the parameters of cases before anything has been computed, and on rows of `runs` afterwards.
     """

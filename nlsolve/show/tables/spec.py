@@ -1,4 +1,4 @@
-"""What a study declares of a table: which runs, laid out by which of their columns, showing what."""
+"""The declaration of a table: which runs, by which columns they are laid out, and which are shown."""
 
 from __future__ import annotations
 

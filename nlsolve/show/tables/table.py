@@ -71,7 +71,7 @@ class Table:
 
 
 def _flat(frame: pd.DataFrame) -> pd.DataFrame:
-    """Row labels as columns, column labels as one text, named by what they are."""
+    """The frame with its row labels as columns, and with one text a column label."""
     names = [str(name) for name in frame.columns.names if name]
     flat = frame.reset_index()
     labels = [

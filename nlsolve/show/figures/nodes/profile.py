@@ -11,13 +11,14 @@ from pydantic import Field
 
 from nlsolve.results.columns import FIELDS
 from nlsolve.results.frames import Frames
+from nlsolve.series import Array
 from nlsolve.show.figures.nodes.panels import NodesFigure, snapshots_of
-from nlsolve.show.figures.nodes.sections import Array, slice_triangles, triangulate
+from nlsolve.show.figures.nodes.sections import slice_triangles, triangulate
 from nlsolve.show.figures.style import axis_label, curve_style, finish, join
 
 
 class ProfileFigure(NodesFigure):
-    """A nodal value along a line parallel to an axis, linear on the cloud's triangles, and the exact value with it."""
+    """A nodal value, and the exact one, along a line parallel to an axis; both are linear on the cloud's triangles."""
 
     kind: Literal["profile"] = "profile"
     axis: Literal["x", "y"] = Field(description="the coordinate that varies along the line")
