@@ -69,7 +69,7 @@ class Cell:
 
 
 class Crossover(Component):
-    """A report on the cheapest strategy, and the columns of `runs` that tell strategies, sizes and linear solvers apart."""
+    """A report on the cheapest strategies, by the columns of `runs` that tell strategies, sizes and solvers apart."""
 
     noun: ClassVar[str] = "crossover"
 
