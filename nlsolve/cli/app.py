@@ -17,12 +17,12 @@ from rich.console import Console
 
 from nlsolve.cli.printing import (
     count,
+    left_out,
     print_frame,
     print_plugins,
     print_results,
     say,
     say_endings,
-    say_left_out,
     stdout,
 )
 from nlsolve.cli.progress import Watch
@@ -93,9 +93,8 @@ def run(
         with Watch(console) as watch:
             results = run_study(checked, folder, listen=watch)
     print_results(results, as_json)
-    say_left_out(results.runs)
-    for note in results.notes:
-        say(note)
+    for line in (*left_out(results.runs), *results.notes):
+        say(line)
     say_endings(results)
     if results.crashed:
         raise typer.Exit(ExitCode.CRASHED)

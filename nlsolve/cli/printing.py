@@ -86,8 +86,8 @@ def say_endings(results: Results) -> None:
         say(f"case {crash['case']} crashed: {crash['message']}")
 
 
-def say_left_out(runs: pd.DataFrame) -> None:
-    """Say the worst value of each audit over the cases and what to do about it; nothing when no audit was made."""
+def left_out(runs: pd.DataFrame) -> list[str]:
+    """Lines with the worst value of each audit over the cases and what to do about it; none when no audit was made."""
     lines = []
     for name, limit in LIMITS.items():
         values = pd.to_numeric(runs[name]).dropna()
@@ -95,8 +95,7 @@ def say_left_out(runs: pd.DataFrame) -> None:
         advice = f"  in {count(over)}: {limit.sentence}" if over else ""
         if len(values):
             lines.append(f"  {name.removeprefix('audit.').replace('_', ' '):<23} {values.max():<8.2g}{advice}".rstrip())
-    if lines:
-        say("\n".join(["What the scenes left out, at its largest:", *lines]))
+    return ["What the scenes left out, at its largest:", *lines] if lines else []
 
 
 def _parameters(row: PluginRow) -> str:
