@@ -206,7 +206,7 @@ grid = { "solver.order" = [10, 20], "solver.tolerance" = [1e-6, 1e-8] }
 name = "branches"
 rows = "solver.order"
 columns = "solver.tolerance"
-value = "branches"
+value = "tangents"
 
 [quick]
 "scene.side" = "right"
@@ -233,6 +233,6 @@ def fake_march(
         listen(Progress(1, 2, 3, 4))
     steps = pd.DataFrame({"increment": [0, 1], "time": [0.0, 0.1], "accepted": [True, True], "range": [1.5, np.nan]})
     fields = pd.DataFrame({"time": [0.1, 0.1], "node": [0, 1], "u": [1.0, 2.0]})
-    branches = round(-np.log10(tolerance)) * 100 // order
-    summary = {"status": "converged", "message": "the stopping test was met", "branches": branches, "ordering": None}
+    tangents = round(-np.log10(tolerance)) * 100 // order
+    summary = {"status": "converged", "message": "the stopping test was met", "tangents": tangents, "ordering": None}
     return Record({**summary, "factorizations": 2, "velocity_error": float("nan")}, steps, fields)

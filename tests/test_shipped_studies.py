@@ -44,6 +44,6 @@ def test_equal_terms_are_equal(tmp_path):
     assert runs["velocity_error"].max() - runs["velocity_error"].min() < 1e-6
     assert (runs["residual_norm"] <= 1e-8).all()
     newton = runs[runs["solver.kind"] == "newton"].iloc[0]
-    assert newton["branches"] == newton["triangular_solves"] == newton["iterations"]
+    assert newton["tangents"] == newton["triangular_solves"] == newton["iterations"]
     homotopy = runs[runs["solver.kind"] == "anm"]
     assert (homotopy["triangular_solves"] % homotopy["solver.order"] == 0).all()

@@ -1,31 +1,36 @@
-"""The command line: run, validate, plan, diagnose, plugins, table. Data on standard output, all else on error."""
+"""The commands of the command line: run, validate, plan, diagnose, plugins, table."""
 
 from __future__ import annotations
 
 import json
-import math
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import asdict
 from enum import IntEnum
 from importlib.metadata import version
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
-import pandas as pd
 import typer
 from pydantic_core import to_jsonable_python
 from rich.console import Console
-from rich.markup import escape
-from rich.table import Table as RichTable
 
+from nlsolve.cli.printing import (
+    count,
+    left_out,
+    print_frame,
+    print_plugins,
+    print_results,
+    say,
+    say_endings,
+    stdout,
+)
 from nlsolve.cli.progress import Watch
-from nlsolve.flow.validity import LIMITS
 from nlsolve.registry.problems import StudyError, did_you_mean
-from nlsolve.registry.registry import PluginRow, load_registry
+from nlsolve.registry.registry import load_registry
+from nlsolve.results.frames import json_rows
 from nlsolve.running.diagnose import diagnose as diagnostics_of
 from nlsolve.running.forecast import ASSUMPTION, forecast
-from nlsolve.running.runner import Results
 from nlsolve.running.runner import run as run_study
 from nlsolve.running.store import StoreError, read_tables
 from nlsolve.show.tables import build
@@ -34,16 +39,13 @@ from nlsolve.study.sweeps import parse_assignments
 
 
 class ExitCode(IntEnum):
-    """What the shell is told."""
+    """The exit codes of the commands."""
 
     COMPLETE = 0
     CRASHED = 1
     INVALID = 2
     INTERRUPTED = 130
 
-
-UNFOLDED = 400
-"""Characters a line may have in a file or a pipe."""
 
 app = typer.Typer(
     help="Compare nonlinear solution strategies on equal terms.", no_args_is_help=True, pretty_exceptions_enable=False
@@ -67,7 +69,7 @@ def common(
 
 
 def show_version(asked: bool) -> None:
-    """Print the version and leave, when asked."""
+    """Print the version and exit, when asked."""
     if asked:
         typer.echo(f"nlsolve {version('nlsolve')}")
         raise typer.Exit
@@ -90,19 +92,11 @@ def run(
         checked = Study.from_toml(study, parse_assignments(settings or []), quick)
         with Watch(console) as watch:
             results = run_study(checked, folder, listen=watch)
-    show_results(results, as_json)
-    for line in left_out(results.runs):
+    print_results(results, as_json)
+    for line in (*left_out(results.runs), *results.notes):
         say(line)
-    for note in results.notes:
-        say(note)
-    endings = ", ".join(f"{number} {word}" for word, number in results.runs["status"].value_counts().items())
-    say(f"{count(len(results.runs))}: {endings}; results in {folder}")
-    failed = results.runs[~results.runs["status"].isin(["converged", "crashed"])]
-    for _, run in failed.drop_duplicates("status").iterrows():
-        say(f"case {run['case']} ended as {run['status']}: {run['message']}")
+    say_endings(results)
     if results.crashed:
-        first = results.runs[results.runs["status"] == "crashed"].iloc[0]
-        say(f"case {first['case']} crashed: {first['message']}")
         raise typer.Exit(ExitCode.CRASHED)
 
 
@@ -129,7 +123,7 @@ def plan(study: StudyFile, settings: Settings = None, quick: Quick = False, as_j
         checked = Study.from_toml(study, parse_assignments(settings or []), quick)
         frame = forecast(checked)
     if as_json:
-        typer.echo(json.dumps({"assumption": ASSUMPTION, "cases": records(frame)}))
+        typer.echo(json.dumps({"assumption": ASSUMPTION, "cases": json_rows(frame)}))
         return
     swept = list(dict.fromkeys(name for case in checked.cases for name in case.swept))
     sizes = ["increments", "nodes", "unknowns", "seconds_factorization", "seconds_start", "seconds", "seconds_all"]
@@ -139,11 +133,11 @@ def plan(study: StudyFile, settings: Settings = None, quick: Quick = False, as_j
 
 @app.command()
 def diagnose(study: StudyFile, settings: Settings = None, quick: Quick = False, as_json: Json = False) -> None:
-    """Say how good the operators on the clouds of a study are: supports, balance, reproduction, largest weight."""
+    """Measure the operators on the clouds of a study: supports, balance, reproduction, largest weight."""
     with ending():
         frame = diagnostics_of(Study.from_toml(study, parse_assignments(settings or []), quick))
     if as_json:
-        typer.echo(json.dumps(records(frame)))
+        typer.echo(json.dumps(json_rows(frame)))
     else:
         print_frame("Operators, one row each", frame)
 
@@ -155,12 +149,7 @@ def plugins(as_json: Json = False) -> None:
     if as_json:
         typer.echo(json.dumps(to_jsonable_python([asdict(row) for row in rows])))
         return
-    table = RichTable()
-    for heading in ("noun", "kind", "from", "parameters"):
-        table.add_column(heading, overflow="fold")
-    for row in rows:
-        table.add_row(row.noun, row.kind, escape(row.source), escape(describe(row)))
-    stdout().print(table)
+    print_plugins(rows)
 
 
 @app.command()
@@ -186,7 +175,7 @@ def table(
 
 @contextmanager
 def ending(folder: Path | None = None) -> Iterator[None]:
-    """Turn invalid input and an interruption into a sentence and an exit code."""
+    """Turn invalid input and an interruption into a sentence on standard error and an exit code."""
     try:
         yield
     except (StudyError, StoreError) as error:
@@ -196,75 +185,3 @@ def ending(folder: Path | None = None) -> Iterator[None]:
         kept = f"; the finished cases are in {folder} and the same command does the rest" if folder else ""
         say(f"interrupted{kept}")
         raise typer.Exit(ExitCode.INTERRUPTED) from error
-
-
-def stdout() -> Console:
-    """Standard output; tables are not folded when it is a file or a pipe."""
-    console = Console()
-    return console if console.is_terminal else Console(width=UNFOLDED)
-
-
-def count(cases: int) -> str:
-    """1 case, 2 cases"""
-    return f"{cases} case{'' if cases == 1 else 's'}"
-
-
-def say(sentence: str) -> None:
-    """A line on standard error."""
-    typer.echo(sentence, err=True)
-
-
-def show_results(results: Results, as_json: bool) -> None:
-    """Declared tables, or the endings of all cases when no table is declared; everything as JSON."""
-    tables = results.tables()
-    if as_json:
-        shown = {table.spec.name: table.long() for table in tables}
-        document = {"study": results.study.name, "folder": str(results.folder), "runs": records(results.runs)}
-        typer.echo(json.dumps(document | {"tables": shown, "notes": list(results.notes)}))
-        return
-    for declared in tables:
-        for printed in declared.rich():
-            stdout().print(printed)
-    if not tables:
-        swept = list(dict.fromkeys(name for case in results.study.cases for name in case.swept))
-        print_frame(results.study.question, results.runs[["case", *swept, "status", "message"]])
-
-
-def left_out(runs: pd.DataFrame) -> list[str]:
-    """The worst value of each audit over the cases, and what is to be done about it; nothing when none was made."""
-    lines = []
-    for name, limit in LIMITS.items():
-        values = pd.to_numeric(runs[name]).dropna()
-        over = int((values > limit.largest).sum())
-        word = f"  in {count(over)}: {limit.sentence}" if over else ""
-        if len(values):
-            lines.append(f"  {name.removeprefix('audit.').replace('_', ' '):<23} {values.max():<8.2g}{word}".rstrip())
-    return ["What the scenes left out, at its largest:", *lines] if lines else []
-
-
-def describe(row: PluginRow) -> str:
-    """Parameters, a line each, or the reason why there are none."""
-    if row.failure is not None:
-        return row.failure
-    return "\n".join(f"{p.name}: {p.type} = {p.default}  {p.description}" for p in row.parameters)
-
-
-def print_frame(title: str, frame: pd.DataFrame) -> None:
-    """A frame on standard output."""
-    printed = RichTable(title=escape(title))
-    for heading in frame.columns:
-        printed.add_column(escape(str(heading)), overflow="fold")
-    for row in frame.itertuples(index=False):
-        printed.add_row(*(escape(f"{value:.4g}" if isinstance(value, float) else str(value)) for value in row))
-    stdout().print(printed)
-
-
-def records(frame: pd.DataFrame) -> list[dict[str, Any]]:
-    """Rows for JSON, where a value that is not a number is null."""
-    return [
-        {
-            str(name): None if isinstance(value, float) and not math.isfinite(value) else value
-            for name, value in row.items()
-        }
-        for row in frame.to_dict("records")
-    ]

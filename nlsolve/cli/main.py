@@ -1,4 +1,4 @@
-"""The console's entry point: the version at once, everything else when it is asked for."""
+"""The entry point of the command line, which loads the commands only when one is called."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from importlib.metadata import version
 
 
 def main() -> None:
-    """`nlsolve …`; `nlsolve --version` loads no library."""
+    """Run `nlsolve …`; `nlsolve --version` loads no library."""
     if sys.argv[1:] == ["--version"]:
         print(f"nlsolve {version('nlsolve')}")
     else:

@@ -1,4 +1,4 @@
-"""How a run is watched: a bar on a terminal, plain lines anywhere else, always on standard error."""
+"""The progress of a run on standard error: a bar on a terminal, plain lines anywhere else."""
 
 from __future__ import annotations
 
@@ -12,10 +12,11 @@ from rich.progress import BarColumn, Progress, TextColumn
 from nlsolve.running.runner import Event
 
 SECONDS_BETWEEN_LINES = 10.0
+"""A line is printed at the end of every case, and this often between."""
 
 
 class Watch:
-    """Listens to a run. A context, because the bar must be taken down."""
+    """A listener of a run that shows its progress. A context: the bar is taken down at its end."""
 
     def __init__(self, console: Console) -> None:
         self.console = console
@@ -36,7 +37,7 @@ class Watch:
         self.bar.stop()
 
     def __call__(self, event: Event) -> None:
-        """Tell an event."""
+        """Show an event."""
         now = event.progress
         part = 1.0 if event.run is not None else now.increment / now.increments if now is not None else 0.0
         if event.resumed:

@@ -28,6 +28,14 @@ class Status(Enum):
         """The short name used in the `status` column."""
         return self.name.lower().replace("_", " ")
 
+    @classmethod
+    def of(cls, word: str) -> Status:
+        """The status whose `word` stands in a result frame. Raises ValueError for any other word."""
+        for status in cls:
+            if status.word == word:
+                return status
+        raise ValueError(f"{word!r} is no status: there are {', '.join(status.word for status in cls)}")
+
     @property
     def sentence(self) -> str:
         """What happened, in a sentence."""

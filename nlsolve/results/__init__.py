@@ -1,4 +1,4 @@
-"""What studies find: the columns of their tables, verdicts on runs, profiles, costs and the values that papers report.
+"""Result frames and what is concluded from them: columns, selection, verdicts, profiles, costs, published values.
 
 It may import series, contracts and registry.
 """

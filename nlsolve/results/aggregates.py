@@ -9,7 +9,7 @@ import pandas as pd
 from pydantic import Field
 
 from nlsolve.contracts.component import Component
-from nlsolve.contracts.status import Status
+from nlsolve.results.frames import Row
 from nlsolve.results.profiles import wilson
 from nlsolve.results.verdicts import SOLVED, Run, cheapest, is_error, percent
 
@@ -18,8 +18,6 @@ NO_RUN = "–"
 
 WITHIN, COUNT = "within", "runs"
 """Columns that come with the cheapest runs, and with counts."""
-
-Record = dict[str, Any]
 
 
 class Cheapest(Component):
@@ -34,30 +32,33 @@ class Cheapest(Component):
     )
 
     def text(self, within: float) -> str:
-        """A threshold for people."""
+        """One of the largest errors allowed, as a table shows it: in percent where the column is a relative error."""
         return percent(within) if is_error(self.error) else f"{within:g}"
 
-    def of(self, runs: Sequence[Run], groups: tuple[str, ...]) -> list[Record]:
-        """A record a threshold and group, with the column `within`; of a group that misses it, nothing but its name."""
+    def of(self, runs: Sequence[Run], groups: tuple[str, ...]) -> list[Row]:
+        """A row for each largest error and each group: its cheapest run, with the column `within`.
+
+        The row of a group in which no run is good enough holds the group and `within` only.
+        """
         found = []
         for within in self.within:
             for key, members in grouped(runs, groups).items():
-                missed = {"status": Status.CONVERGED.word, **dict(zip(groups, key, strict=True))}
                 best = cheapest(members, self.cost, self.error, within)
-                found.append({**(missed if best is None else best), WITHIN: self.text(within)})
+                row = dict(zip(groups, key, strict=True)) if best is None else best
+                found.append({**row, WITHIN: self.text(within)})
         return found
 
 
-def counted(runs: Sequence[Run], groups: tuple[str, ...]) -> list[Record]:
-    """A record a group, with the columns `runs`, how many there are, and `solved`, how many of them are."""
+def counted(runs: Sequence[Run], groups: tuple[str, ...]) -> list[Row]:
+    """A row a group, with its number of runs in the column `runs`, and of solved runs in the column `solved`."""
     return [
         {**dict(zip(groups, key, strict=True)), COUNT: len(members), SOLVED: sum(bool(run[SOLVED]) for run in members)}
         for key, members in grouped(runs, groups).items()
     ]
 
 
-def success(runs: Sequence[Run], groups: tuple[str, ...], interval: float, form: str) -> list[Record]:
-    """A record a group, with the column `solved`: the share of runs solved and its interval, "0.85 [0.70, 0.95]"."""
+def success(runs: Sequence[Run], groups: tuple[str, ...], interval: float, form: str) -> list[Row]:
+    """A row a group, with the share of its runs that are solved and the share's interval, "0.85 [0.70, 0.95]"."""
     found = []
     for key, members in grouped(runs, groups).items():
         solved = sum(bool(run[SOLVED]) for run in members)
@@ -76,5 +77,5 @@ def grouped(runs: Sequence[Run], groups: tuple[str, ...]) -> dict[tuple[Any, ...
 
 
 def key_of(names: tuple[str, ...], run: Run) -> tuple[Any, ...]:
-    """A run's values of some columns."""
+    """A run's values of some columns, NO_RUN for those it has no value of."""
     return tuple(NO_RUN if pd.isna(run.get(name)) else run.get(name) for name in names)

@@ -1,150 +1,259 @@
-"""The columns of the result tables, each with its meaning and unit: the one description of what nlsolve measures."""
+"""The columns of the result frames, each with its meaning, unit and symbol."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
 from typing import Any
 
-REPORTED: dict[str, str] = {
-    "reported_iterations": "iterations that the library behind a method says it took",
-    "reported_residuals": "residuals that it says it evaluated",
-    "reported_jacobians": "Jacobians that it says it evaluated",
-    "reported_factorizations": "set-ups of its preconditioner, here K*, that it says it asked for",
-    "reported_triangular_solves": "solves with it that it says it asked for",
-}
-"""What a library says of its own work, to be held against the counts beside it; NaN where it says nothing."""
+from nlsolve.registry.problems import did_you_mean
 
-RUNS: dict[str, str] = {
-    "case": "identity of the case: a digest of its validated components",
-    "status": "how the case ended, in a word or two",
-    "message": "how the case ended, in a sentence",
-    "said_converged_but_is_not": "solves in which the method, or a stopping test other than that of residuals, said "
-    "converged of a state whose residual says otherwise",
-    "said_failed_but_is": "solves in which the method said failed of a state that is a solution",
-    "blame_x": "of a failed solve: the node where the last residual is largest, x [mm]",
-    "blame_y": "the same, y [mm]",
-    "blame_rate": "strain rate ε̄ nearest to that node [1/s]",
-    "blame_regularized": "share of the strain points with ε̄ < ε₀ at that state",
-    "blame_unknown": "of a failed solve of a system: the number of the unknown whose equation is farthest from solved",
-    "nodes": "N, nodes of the cloud",
-    "unknowns": "U, unknown velocity components, or unknowns of a system",
-    "smallest_spacing": "smallest distance between two nodes at t = 0 [mm]",
-    "cloud_quality": "moving nodes: least distance of a node to its nearest over that at t = 0, over the march",
-    "increments": "time steps completed; 1 for a steady state",
-    "time": "time reached [s]",
-    "iterations": "iterations or series used by the method in all increments",
-    "pressure_iterations": "iterations of the pressure in all increments, where the scene asks for a divergence",
-    "branches": "tangents K* factorised during the march (the 2015 paper's NIM)",
-    "validity_time": "how long the first tangent of the march served [s]",
-    "factorizations": "matrices factorised during the march",
-    "triangular_solves": "pairs of triangular solves during the march",
-    "jacobians": "Jacobians assembled during the march",
-    "residuals": "residuals evaluated by the method during the march",
-    "series_orders": "Taylor coefficients of the residual computed during the march",
-    "series_terms": "sum of their orders j: order j convolves j earlier terms, so this is how their cost grows",
-    "expansions": "of the residuals, those that began a series",
-    "matrix_products": "products with an assembled Jacobian during the march",
-    **REPORTED,
-    "start_factorizations": "matrices factorised on the way to the first state",
-    "start_triangular_solves": "pairs of triangular solves on the way to the first state",
-    "start_residuals": "residuals evaluated on the way to the first state",
-    "seconds": "processor time inside the method: its own work and all it asked for [s]",
-    "seconds_factorization": "of it, factorising [s]",
-    "seconds_triangular_solve": "of it, triangular solves [s]",
-    "seconds_jacobian": "of it, assembling Jacobians [s]",
-    "seconds_residual": "of it, residuals [s]",
-    "seconds_series": "of it, series coefficients [s]",
-    "seconds_own": "of it, the method's own work: norms, mixing, extrapolation [s]",
-    "seconds_most": "the same as `seconds` in the slowest of several rounds [s]",
-    "seconds_predicted": "the same by the cost model: counts times unit costs, and own work as other linear solvers "
-    "saw it [s]",
-    "rounds": "how often the case was timed; the seconds are those of its fastest round",
-    "clock": "what the seconds are told by: wall, or processor, which other programs do not keep waiting",
-    "unit.residual": "measured on the last problem of the case: one residual [s]",
-    "unit.expansion": "the same: beginning a series [s]",
-    "unit.jacobian": "the same: one Jacobian [s]",
-    "unit.matrix_product": "the same: one product with a Jacobian [s]",
-    "unit.factorization": "the same: one factorisation, its ordering known [s]",
-    "unit.triangular_solve": "the same: one pair of triangular solves [s]",
-    "unit.series_order": "the same: a Taylor coefficient of order j costs this … [s]",
-    "unit.series_term": "… and j times this [s]",
-    "seconds_operators": "building operators, the same for every method and not in `seconds` [s]",
-    "seconds_start": "reaching the first state [s]",
-    "seconds_all": "operators, first state and march: what the result costs in all [s]",
-    "ordering": "column ordering the linear solver used",
-    "fill": "entries stored in the last factors",
-    "factor_solve_ratio": "measured time of one factorisation over one pair of triangular solves",
-    "condition": "estimate of ‖K*‖₁ ‖K*⁻¹‖₁ for the last tangent, where the linear solver can tell",
-    "residual_norm": "largest relative residual accepted in any increment, asked for outside the method",
-    "divergence": "‖div V‖/‖ε̄‖ over volume points and strain points at the end, with a volumetric term",
-    "velocity_error": "relative ℓ² error of the velocities of all nodes at the end, where there is an exact solution",
-    "velocity_error_inside": "the same over the interior nodes alone, whose velocities are not given",
-    "velocity_error_estimate": "an estimate of it without an exact solution: how much one Newton step in another "
-    "discretisation of the same nodes (section `error_estimator`) would change these velocities",
-    "reference_error": "relative ℓ² difference of the velocities of all nodes at the end from those of the case that "
-    "the study makes its reference",
-    "root_error": "‖u − root‖/‖root‖ for the known root nearest to where a system ended (‖u‖ for the root 0)",
-    "root_singular": "true for a system whose Jacobian is singular at a known root: a small residual says little there",
-    "torque": "torque of the moving wall on the material per mm of thickness [N mm/mm]",
-    "torque_error": "relative error of the torque against the exact solution",
-    "force_x": "force of the moving wall on the material per mm of thickness, x [N/mm]",
-    "force_y": "the same, y [N/mm]",
-    "force_error": "‖force − exact force‖/‖exact force‖, where the exact solution has a force",
-    "audit.inertia": "‖ρ ∂V/∂t‖/‖∇S‖ over the last increment (on moving nodes ρ dV/dt), where inertia is left out",
-    "audit.convection": "‖ρ (V·∇) V‖/‖∇S‖ at the end, where convection is left out and nodes are fixed",
-    "audit.compressibility": "‖div V‖/‖ε̄‖ at the end; without a volumetric term from gradients at the nodes",
-    "audit.regularization": "share of the strain points with ε̄ < 10 ε₀, for a law with a regularization",
-    "audit.regularization_stress": "share of Σ |S| that these strain points carry",
-    "audit.regularization_strain": "share of Σ ε̄ that they carry; about three times this is the error inside it makes",
-    "audit.residual": "‖R‖ over the size of the stresses' forces that cancel in it",
-    "audit.balance": "‖div S + f − ρ dV/dt‖/‖∇S‖ by operators other than those solved with, where no pressure acts",
-    "audit.resolution": "share of the change of V between neighbouring inner nodes that its gradients do not explain",
-    "audit.heating": "largest adiabatic heating S:ε̇/(ρ c_p) over the time reached, or a time 2π/reference rate [K]",
-    "doubt": "what the audits, or a system's roots, put in doubt, and the way out; empty when nothing",
-}
+
+@dataclass(frozen=True)
+class Column:
+    """A column of a result frame.
+
+    unit : such as "mm/s"; empty for words, counts and ratios.
+    symbol : what an axis calls the column, in TeX mathematics or in words; empty: its name with spaces.
+    relative_error : whether it is a relative error, which people read in percent.
+    """
+
+    name: str
+    meaning: str
+    unit: str = ""
+    symbol: str = ""
+    relative_error: bool = False
+
+
+def _by_name(*columns: Column) -> Mapping[str, Column]:
+    return MappingProxyType({column.name: column for column in columns})
+
+
+REPORTED = _by_name(
+    Column("reported_iterations", "iterations that the library behind a method says it took"),
+    Column("reported_residuals", "residuals that it says it evaluated"),
+    Column("reported_jacobians", "Jacobians that it says it evaluated"),
+    Column("reported_factorizations", "set-ups of its preconditioner, here K*, that it says it asked for"),
+    Column("reported_triangular_solves", "solves with its preconditioner that it says it asked for"),
+)
+"""What a library reports of its own work, to compare with what the ledger counts; NaN where it reports nothing."""
+
+RUNS = _by_name(
+    Column("case", "identity of the case: a digest of its validated components"),
+    Column("status", "how the case ended, in a word or two"),
+    Column("message", "how the case ended, in a sentence"),
+    Column(
+        "false_convergence",
+        "solves in which the method, or a stopping test other than that of residuals, said converged of a state whose "
+        "residual says otherwise",
+    ),
+    Column("false_failure", "solves in which the method said failed of a state that is a solution"),
+    Column("blame_x", "of a failed solve: x of the node where the last residual is largest", "mm"),
+    Column("blame_y", "of a failed solve: y of that node", "mm"),
+    Column("blame_rate", "of a failed solve: strain rate ε̄ nearest to that node", "1/s"),
+    Column("blame_regularized", "of a failed solve: share of the strain points with ε̄ < ε₀ at the last state"),
+    Column("blame_unknown", "of a failed solve of a system: the unknown whose equation is farthest from solved"),
+    Column("nodes", "N, nodes of the cloud"),
+    Column("unknowns", "U, unknown velocity components, or unknowns of a system"),
+    Column("smallest_spacing", "smallest distance between two nodes at t = 0", "mm"),
+    Column(
+        "cloud_quality",
+        "moving nodes: least distance of a node to its nearest over that distance at t = 0, over the march",
+    ),
+    Column("increments", "time steps completed; 1 for a steady state"),
+    Column("time", "time reached", "s", "$t$"),
+    Column("iterations", "iterations or series used by the method in all increments"),
+    Column("pressure_iterations", "iterations of the pressure in all increments, where the scene has a pressure"),
+    Column("tangents", "tangents K* factorised during the march (NIM of the 2015 paper)"),
+    Column("validity_time", "how long the first tangent of the march served", "s", "time served by the first tangent"),
+    Column("factorizations", "matrices factorised during the march", symbol="factorisations"),
+    Column("triangular_solves", "pairs of triangular solves during the march"),
+    Column("jacobians", "Jacobians assembled during the march"),
+    Column("residuals", "residuals evaluated by the method during the march"),
+    Column("series_orders", "Taylor coefficients of the residual computed during the march"),
+    Column("series_terms", "sum of their orders j: order j convolves j earlier terms, so this is how their cost grows"),
+    Column("expansions", "those of the residuals that began a series"),
+    Column("matrix_products", "products with an assembled Jacobian during the march"),
+    *REPORTED.values(),
+    Column("start_factorizations", "matrices factorised on the way to the first state"),
+    Column("start_triangular_solves", "pairs of triangular solves on the way to the first state"),
+    Column("start_residuals", "residuals evaluated on the way to the first state"),
+    Column("seconds", "time inside the method: its own work and all it asked for", "s", "time inside the method"),
+    Column("seconds_factorization", "the part of `seconds` spent on factorising", "s"),
+    Column("seconds_triangular_solve", "the part of `seconds` spent on triangular solves", "s"),
+    Column("seconds_jacobian", "the part of `seconds` spent on assembling Jacobians", "s"),
+    Column("seconds_residual", "the part of `seconds` spent on residuals", "s"),
+    Column("seconds_series", "the part of `seconds` spent on series coefficients", "s"),
+    Column("seconds_own", "the part of `seconds` spent by the method itself: norms, mixing, extrapolation", "s"),
+    Column("seconds_most", "`seconds` of the slowest of several rounds", "s"),
+    Column(
+        "seconds_predicted",
+        "`seconds` by the cost model: counts times unit costs, and own work as with other linear solvers",
+        "s",
+    ),
+    Column("rounds", "how often the case was timed; the seconds are those of its fastest round"),
+    Column("clock", "clock of the seconds: wall, or processor, which does not count the time given to other programs"),
+    Column("unit.residual", "measured on the last problem of the case: seconds of one residual", "s"),
+    Column("unit.expansion", "as unit.residual: beginning a series", "s"),
+    Column("unit.jacobian", "as unit.residual: one Jacobian", "s"),
+    Column("unit.matrix_product", "as unit.residual: one product with a Jacobian", "s"),
+    Column("unit.factorization", "as unit.residual: one factorisation, its ordering known", "s"),
+    Column("unit.triangular_solve", "as unit.residual: one pair of triangular solves", "s"),
+    Column(
+        "unit.series_order", "as unit.residual: c_order of a Taylor coefficient j, which costs c_order + j c_term", "s"
+    ),
+    Column(
+        "unit.series_term", "as unit.residual: c_term of a Taylor coefficient j, which costs c_order + j c_term", "s"
+    ),
+    Column("seconds_operators", "building operators, the same for every method and not in `seconds`", "s"),
+    Column("seconds_start", "reaching the first state", "s"),
+    Column("seconds_all", "operators, first state and march: what the result costs in all", "s"),
+    Column("ordering", "column ordering the linear solver used"),
+    Column("fill", "entries stored in the last factors", symbol="entries of the factors"),
+    Column(
+        "factor_solve_ratio",
+        "measured time of one factorisation over one pair of triangular solves",
+        symbol="factorisation / triangular solve",
+    ),
+    Column("condition", "estimate of ‖K*‖₁ ‖K*⁻¹‖₁ for the last tangent, where the linear solver can tell"),
+    Column(
+        "residual_norm",
+        "largest relative residual accepted in any increment, evaluated outside the method",
+        symbol="relative residual",
+    ),
+    Column("divergence", "‖div V‖/‖ε̄‖ over volume points and strain points at the end, with a volumetric term"),
+    Column(
+        "velocity_error",
+        "relative ℓ² error of the velocities of all nodes at the end, where there is an exact solution",
+        symbol="relative error of the velocity",
+        relative_error=True,
+    ),
+    Column(
+        "velocity_error_inside",
+        "relative ℓ² error of the velocities of the interior nodes alone, which are not given",
+        relative_error=True,
+    ),
+    Column(
+        "velocity_error_estimate",
+        "estimate of velocity_error without an exact solution: how much one Newton step in another discretisation of "
+        "the same nodes would change the velocities",
+        relative_error=True,
+    ),
+    Column(
+        "reference_error",
+        "relative ℓ² difference of the velocities of all nodes at the end from those of the study's reference case",
+        relative_error=True,
+    ),
+    Column(
+        "root_error",
+        "‖u − root‖/‖root‖ for the known root nearest to where a system ended (‖u‖ for the root 0)",
+        relative_error=True,
+    ),
+    Column(
+        "root_singular", "whether the Jacobian of a system is singular at a known root: a small residual says little"
+    ),
+    Column("torque", "torque of the moving wall on the material per mm of thickness", "N mm/mm"),
+    Column(
+        "torque_error",
+        "relative error of the torque against the exact solution",
+        symbol="relative error of the torque",
+        relative_error=True,
+    ),
+    Column("force_x", "x force of the moving wall on the material per mm of thickness", "N/mm"),
+    Column("force_y", "y force of the moving wall on the material per mm of thickness", "N/mm"),
+    Column(
+        "force_error", "‖force − exact force‖/‖exact force‖, where the exact solution has a force", relative_error=True
+    ),
+    Column(
+        "audit.inertia", "‖ρ ∂V/∂t‖/‖∇S‖ over the last increment (on moving nodes ρ dV/dt), where inertia is left out"
+    ),
+    Column("audit.convection", "‖ρ (V·∇) V‖/‖∇S‖ at the end, where convection is left out and nodes are fixed"),
+    Column("audit.compressibility", "‖div V‖/‖ε̄‖ at the end; without a volumetric term from gradients at the nodes"),
+    Column("audit.regularization", "share of the strain points with ε̄ < 10 ε₀, for a law with a regularization"),
+    Column("audit.regularization_stress", "share of Σ |S| that these strain points carry"),
+    Column(
+        "audit.regularization_strain",
+        "share of Σ ε̄ that these strain points carry; the error inside from ε₀ is about three times this",
+    ),
+    Column("audit.residual", "‖R‖ over the size of the stresses' forces that cancel in it"),
+    Column(
+        "audit.balance",
+        "‖div S + f − ρ dV/dt‖/‖∇S‖ by operators other than those solved with, where no pressure acts",
+    ),
+    Column(
+        "audit.resolution",
+        "share of the change of V between neighbouring inner nodes that its gradients do not explain",
+    ),
+    Column(
+        "audit.heating", "largest adiabatic heating S:ε̇/(ρ c_p) over the time reached, or a time 2π/reference rate", "K"
+    ),
+    Column("doubt", "what the audits, or a system's roots, put in doubt, and the way out; empty when nothing"),
+)
 """`runs`: a row a case, whatever its ending. Behind these stand all parameters of the case, dotted ("solver.order")."""
 
-DIAGNOSTICS: dict[str, str] = {
-    "operator": "what the weights are for: strain, force, volume",
-    "targets": "places the weights belong to",
-    "smallest_support": "fewest neighbours of a place",
-    "largest_support": "most neighbours of a place",
-    "grown": "places whose support had to grow to become unisolvent and balanced",
-    "balance": "smallest ratio of the least to the largest singular value of a support's local system",
-    "reproduction_error": "largest error of derivatives of polynomials of the degree, scaled by the weights",
-    "largest_weight": "largest sum of |weights| times the distance of neighbours: amplification of rounding and noise",
-}
+DIAGNOSTICS = _by_name(
+    Column("operator", "what the weights are for: strain, force, volume"),
+    Column("targets", "places the weights belong to"),
+    Column("smallest_support", "fewest neighbours of a place"),
+    Column("largest_support", "most neighbours of a place"),
+    Column("grown", "places whose support had to grow to become unisolvent and balanced"),
+    Column("balance", "smallest ratio of the least to the largest singular value of a support's local system"),
+    Column("reproduction_error", "largest error of derivatives of polynomials of the degree, scaled by the weights"),
+    Column(
+        "largest_weight",
+        "largest sum of |weights| times the distance of neighbours: amplification of rounding and noise",
+    ),
+)
 """`nlsolve diagnose`: a row an operator of a cloud."""
 
-STEPS: dict[str, str] = {
-    "case": "identity of the case",
-    "increment": "number of the time step; 0 for a steady state",
-    "time": "time at the end of the increment [s]",
-    "step": "number of the step within the increment; 0 is the state the increment began with",
-    "accepted": "true on the last step of a finished increment",
-    "branch": "tangents factorised so far in the march",
-    "triangular_solves": "pairs of triangular solves so far in the march",
-    "residual_norm": "relative residual at the step",
-    "difference": "relative difference from the step before, in the norm of the stopping test",
-    "range": "a_max of the last series computed for the step",
-    "singularity": "distance of the nearest singularity of the last series, as a part of its path, from its last terms",
-    "limited_by": "what limited that range: end of path, the range rule, pole (of a Padé), order (the highest) or cost "
-    "(a new branch is cheaper than more orders)",
-    "length": "step length of the line search, or the part of the path a series advanced",
-    "contraction": "residual norm over that of the step before, as the refresh rule is told (newton-krylov: per inner "
-    "iteration; anm: per order; petsc-snes, kinsol: per solve with K*; scipy-root: per value of R)",
-    **REPORTED,
-    "seconds": "time inside the method so far in the march [s]",
-    "probe_x": "place of the probe node, x [mm] (accepted steps)",
-    "probe_y": "the same, y [mm]",
-    "probe_u": "velocity of the probe node, x [mm/s]",
-    "probe_v": "the same, y [mm/s]",
-}
+STEPS = _by_name(
+    Column("case", "identity of the case"),
+    Column("increment", "number of the time step; 0 for a steady state"),
+    Column("time", "time at the end of the increment", "s", "$t$"),
+    Column("step", "number of the step within the increment; 0 is the state the increment began with"),
+    Column("accepted", "whether it is the last step of a finished increment"),
+    Column("tangents", "tangents factorised so far in the march"),
+    Column("triangular_solves", "pairs of triangular solves so far in the march"),
+    Column("residual_norm", "relative residual at the step", symbol="relative residual"),
+    Column(
+        "difference",
+        "relative difference from the step before, in the norm of the stopping test",
+        symbol="relative difference",
+    ),
+    Column("range", "a_max of the last series computed for the step", symbol=r"$a_{\max}$"),
+    Column(
+        "singularity",
+        "distance of the nearest singularity of the last series, as a part of its path, from its last terms",
+    ),
+    Column(
+        "limited_by",
+        "what limited that range: end of path, the range rule, pole (of a Padé), order (the highest) or cost (a new "
+        "branch is cheaper than more orders)",
+    ),
+    Column(
+        "length",
+        "step length of the line search, or the part of the path a series advanced",
+        symbol="step length",
+    ),
+    Column(
+        "contraction",
+        "residual norm over that of the step before, as the refresh rule is told (newton-krylov: per inner iteration; "
+        "anm: per order; petsc-snes, kinsol: per solve with K*; scipy-root: per value of R)",
+    ),
+    *REPORTED.values(),
+    Column("seconds", "time inside the method so far in the march", "s", "time inside the method"),
+    Column("probe_x", "x of the probe node, on accepted steps", "mm", "$x$"),
+    Column("probe_y", "y of the probe node, on accepted steps", "mm", "$y$"),
+    Column("probe_u", "x velocity of the probe node, on accepted steps", "mm/s", "$u$"),
+    Column("probe_v", "y velocity of the probe node, on accepted steps", "mm/s", "$v$"),
+)
 """`steps`: a row an iteration or series, in order. A column that does not apply to a method or scene holds NaN. Behind
 these stand the notes of a method for which there is no column, as "note.<name>".
 """
 
-NOTE = "note."
+NOTE, MEASURED = "note.", "measured."
+"""Before the names of what no column knows: notes of a step by its method, measures of a state by its scene."""
 
 
 def step_columns(notes: Mapping[str, Any]) -> dict[str, Any]:
@@ -152,24 +261,49 @@ def step_columns(notes: Mapping[str, Any]) -> dict[str, Any]:
     return {name if name in STEPS else f"{NOTE}{name}": value for name, value in notes.items()}
 
 
-FIELDS: dict[str, str] = {
-    "case": "identity of the case",
-    "time": "time of the snapshot [s]",
-    "node": "number of the node",
-    "boundary": "name of the boundary group of the node; empty inside",
-    "x0": "place of the node, and of its marker, at t = 0, x [mm]",
-    "y0": "the same, y [mm]",
-    "x": "place, x [mm]",
-    "y": "the same, y [mm]",
-    "marker_x": "place of the marker that started at the node, x [mm]; NaN without markers, or once it has left",
-    "marker_y": "the same, y [mm]",
-    "u": "velocity, x [mm/s]",
-    "v": "the same, y [mm/s]",
-    "exx": "strain rate ε̇xx [1/s]",
-    "eyy": "strain rate ε̇yy [1/s]",
-    "exy": "strain rate ε̇xy [1/s]",
-    "rate": "equivalent strain rate ε̄ [1/s]",
-    "exact_u": "exact velocity, x [mm/s]; NaN where the scene has none",
-    "exact_v": "the same, y [mm/s]",
-}
+def run_columns(measures: Mapping[str, Any]) -> dict[str, Any]:
+    """What a scene measures of its states, by columns of `runs`: those described there, or "measured.<name>"."""
+    return {name if name in RUNS else f"{MEASURED}{name}": value for name, value in measures.items()}
+
+
+FIELDS = _by_name(
+    Column("case", "identity of the case"),
+    Column("time", "time of the snapshot", "s", "$t$"),
+    Column("node", "number of the node"),
+    Column("boundary", "name of the boundary group of the node; empty inside"),
+    Column("x0", "x of the node, and of its marker, at t = 0", "mm"),
+    Column("y0", "y of the node, and of its marker, at t = 0", "mm"),
+    Column("x", "x of the node", "mm", "$x$"),
+    Column("y", "y of the node", "mm", "$y$"),
+    Column("marker_x", "x of the marker that started at the node; NaN without markers, or once it has left", "mm"),
+    Column("marker_y", "y of the marker that started at the node; NaN without markers, or once it has left", "mm"),
+    Column("u", "x velocity", "mm/s", "$u$"),
+    Column("v", "y velocity", "mm/s", "$v$"),
+    Column("exx", "strain rate ε̇xx", "1/s", r"$\dot{\varepsilon}_{xx}$"),
+    Column("eyy", "strain rate ε̇yy", "1/s", r"$\dot{\varepsilon}_{yy}$"),
+    Column("exy", "strain rate ε̇xy", "1/s", r"$\dot{\varepsilon}_{xy}$"),
+    Column("rate", "equivalent strain rate ε̄", "1/s", r"$\bar{\varepsilon}$"),
+    Column("exact_u", "exact x velocity; NaN where the scene has none", "mm/s"),
+    Column("exact_v", "exact y velocity; NaN where the scene has none", "mm/s"),
+)
 """`fields`: a row a node and recorded time."""
+
+FRAMES: Mapping[str, Mapping[str, Column]] = MappingProxyType({"runs": RUNS, "steps": STEPS, "fields": FIELDS})
+"""The columns of each result frame, by its name."""
+
+RENAMED: Mapping[str, str] = MappingProxyType(
+    {
+        "branches": "tangents",
+        "branch": "tangents",
+        "said_converged_but_is_not": "false_convergence",
+        "said_failed_but_is": "false_failure",
+    }
+)
+"""What columns of `runs` and `steps` were once called -> what they are called now."""
+
+
+def no_such_column(name: str, known: Iterable[str]) -> str:
+    """The sentence for a name that is no column: what the column is called now, or the nearest of the names `known`."""
+    if name in RENAMED:
+        return f"this column is called {RENAMED[name]} now"
+    return f"no such column of the results; {did_you_mean(name, known)}"

@@ -1,9 +1,9 @@
-"""Share of problems solved, within what cost, and how certain it is. A failure costs ∞, and stays in every share."""
+"""The share of problems that a strategy solves within a cost, and how certain it is. A failure costs ∞."""
 
 from __future__ import annotations
 
 import numpy as np
-from scipy.special import ndtri
+from scipy.stats import binomtest, bootstrap
 
 from nlsolve.series import Array
 
@@ -29,14 +29,22 @@ def within(costs: Array, limits: Array) -> Array:
 def band(costs: Array, limits: Array, interval: float, samples: int, seed: int) -> tuple[Array, Array]:
     """Ends (S, T) of the interval that holds this part of the shares when the P problems are drawn anew, P at a time.
 
-    The percentile bootstrap (Efron 1979) over problems; all strategies are given the same draws.
+    The percentile bootstrap (Efron 1979) over problems; one seed gives all strategies the same draws.
     """
-    problems = costs.shape[1]
-    drawn = np.random.default_rng(seed).multinomial(problems, np.full(problems, 1.0 / problems), samples) / problems
-    tails = (0.5 - 0.5 * interval, 0.5 + 0.5 * interval)
-    ends = [np.quantile(drawn @ (row[:, None] <= limits), tails, axis=0) for row in costs]
-    low, high = np.clip(np.stack(ends, axis=1), 0.0, 1.0)
-    return low, high
+    if costs.shape[1] == 1:  # a single problem drawn anew is the same problem
+        shares = within(costs, limits)
+        return shares, shares
+
+    def share(drawn: Array, axis: int) -> Array:
+        return np.stack([(drawn <= limit).mean(axis=axis) for limit in limits])
+
+    ends = [
+        bootstrap(
+            (row,), share, n_resamples=samples, confidence_level=interval, method="percentile", rng=seed
+        ).confidence_interval
+        for row in costs
+    ]
+    return np.array([low for low, _ in ends]), np.array([high for _, high in ends])
 
 
 def wilson(solved: int, runs: int, interval: float) -> tuple[float, float]:
@@ -44,8 +52,5 @@ def wilson(solved: int, runs: int, interval: float) -> tuple[float, float]:
 
     The score interval (Wilson 1927). A bootstrap is certain of success after five of five; this is not.
     """
-    z, share = float(ndtri(0.5 + 0.5 * interval)), solved / runs
-    middle = share + z**2 / (2 * runs)
-    half = z * np.sqrt(share * (1.0 - share) / runs + z**2 / (4 * runs**2))
-    low, high = (middle - half) / (1.0 + z**2 / runs), (middle + half) / (1.0 + z**2 / runs)
-    return max(float(low), 0.0), min(float(high), 1.0)
+    low, high = binomtest(solved, runs).proportion_ci(interval, method="wilson")
+    return float(low), float(high)

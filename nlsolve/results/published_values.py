@@ -12,8 +12,8 @@ from pydantic import Field
 from nlsolve.contracts.component import Component
 
 
-class PaperValues(Component):
-    """What a paper reports for the cells of a table, in the table's own order of rows and columns."""
+class PublishedValues(Component):
+    """A paper's values for the cells of a table, in the table's order of rows and columns."""
 
     noun: ClassVar[str] = "paper"
 

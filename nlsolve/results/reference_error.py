@@ -1,4 +1,4 @@
-"""‖v − v_ref‖₂/‖v_ref‖₂ : every run beside the one that its study declares to be the reference."""
+"""‖v − v_ref‖₂/‖v_ref‖₂ : distance of every run from the reference case of its study."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ REFERENCE = "reference"
 def with_reference_errors(frames: Frames, references: Mapping[str, str]) -> Frames:
     """`runs` with the column `reference_error`: of the velocities of all nodes at the last recorded time.
 
-    references : case -> the case it is held against. NaN where one of the two is missing or ended at another time.
+    references : case -> its reference case. NaN where one of the two is missing or ended at another time.
     """
     if not references:
         return frames

@@ -8,7 +8,7 @@ import pandas as pd
 
 from nlsolve.contracts.status import SolveError
 from nlsolve.results.columns import DIAGNOSTICS
-from nlsolve.results.verdicts import names_settings
+from nlsolve.results.parameters import names_settings
 from nlsolve.solving.ledger import Ledger
 from nlsolve.study.study import Study
 

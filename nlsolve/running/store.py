@@ -1,10 +1,10 @@
-"""A results folder: parts written whole as cases finish, merged into tidy files, and resumed by the same study only."""
+"""A results folder: the part of every finished case, tidy files of all of them, and the study that may resume it."""
 
 from __future__ import annotations
 
 import json
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,29 +16,33 @@ from pyarrow import ArrowException
 
 from nlsolve.contracts.status import Status
 from nlsolve.results.columns import FIELDS, RUNS, STEPS
-from nlsolve.results.frames import Frames
+from nlsolve.results.frames import Frames, Row, rows_of
+from nlsolve.results.verdicts import status_of
 from nlsolve.show.tables import TableSpec
 from nlsolve.study.study import Study
 
 STUDY, CASES = "study.json", "cases"
-TRIED_AGAIN = {Status.CRASHED.word, Status.NOT_APPLICABLE.word}
+"""Names of the file that describes the study, and of the folder of parts."""
+
+TRIED_AGAIN = frozenset({Status.CRASHED, Status.NOT_APPLICABLE})
+"""A case that ended so is run again: what it lacked may have been installed since."""
 
 
 class StoreError(ValueError):
-    """A results folder that cannot be used: one sentence with the way out."""
+    """A results folder cannot be used; the sentence says why, and what to do."""
 
 
 @dataclass(frozen=True)
 class Part:
-    """What one case left: its row of `runs`, its rows of `steps` and of `fields`."""
+    """The results of one case: its row of `runs`, its rows of `steps` and of `fields`."""
 
-    run: dict[str, Any]
+    run: Row
     steps: pd.DataFrame
     fields: pd.DataFrame
 
 
 def merge(parts: list[Part]) -> Frames:
-    """Parts, in order, as tidy frames with the documented columns first and the parameters behind them."""
+    """The frames of several cases: `runs` with the documented columns first and the parameters behind them."""
     names = list(dict.fromkeys([*RUNS, *(name for part in parts for name in part.run)]))
     runs = pd.DataFrame([part.run for part in parts], columns=names)
     steps, fields = _stacked([part.steps for part in parts], STEPS), _stacked([part.fields for part in parts], FIELDS)
@@ -46,7 +50,7 @@ def merge(parts: list[Part]) -> Frames:
 
 
 class Store:
-    """The folder of one study. Raises StoreError when it belongs to another study or cannot be written."""
+    """The results folder of one study. Raises StoreError when it belongs to another study or cannot be written."""
 
     def __init__(self, folder: Path, study: Study) -> None:
         self.folder, self.study = folder, study
@@ -63,27 +67,24 @@ class Store:
         self.write_text(STUDY, json.dumps(identity, indent=1, ensure_ascii=False) + "\n")
 
     def load(self, case: str) -> Part | None:
-        """The part of a finished case; None when there is none, it is damaged, the case crashed, or its method did not
-        apply: what it lacked may have been installed since.
-        """
+        """The part of a finished case; None when there is none, it is damaged, or its case is to be tried again."""
         try:
             runs, steps, fields = (pd.read_parquet(self._part(case, name)) for name in ("runs", "steps", "fields"))
-        except (OSError, ValueError, ArrowException):
+            (run,) = rows_of(runs)
+            usable = run["case"] == case and status_of(run) not in TRIED_AGAIN
+        except (OSError, ValueError, KeyError, ArrowException):
             return None
-        if list(runs.get("case", [])) != [case] or runs["status"].iloc[0] in TRIED_AGAIN:
-            return None
-        row = next(runs.itertuples(index=False))
-        return Part(dict(zip(runs.columns, row, strict=True)), steps, fields)
+        return Part(run, steps, fields) if usable else None
 
     def save(self, part: Part) -> None:
-        """Keep a part. Its row is written last: a part with a row is complete."""
+        """Write a part. Its row is written last: a part with a row is complete."""
         case = part.run["case"]
         self._parquet(self._part(case, "fields"), part.fields)
         self._parquet(self._part(case, "steps"), part.steps)
         self._parquet(self._part(case, "runs"), pd.DataFrame([part.run]))
 
     def write_frames(self, frames: Frames) -> None:
-        """runs and steps as parquet and CSV, fields as parquet."""
+        """Write runs and steps as parquet and CSV, fields as parquet."""
         for name, frame in (("runs", frames.runs), ("steps", frames.steps)):
             self._parquet(self.folder / f"{name}.parquet", frame)
             self.write_text(f"{name}.csv", frame.to_csv(index=False))
@@ -103,7 +104,7 @@ class Store:
 
     @contextmanager
     def _replacing(self, path: Path) -> Iterator[Path]:
-        """A name to write to, which takes the place of `path` once it is complete."""
+        """A temporary file to write to, which takes the place of `path` when it is complete."""
         temporary = path.with_name(f".{path.name}.{os.getpid()}")
         with self.writing():
             path.parent.mkdir(parents=True, exist_ok=True)
@@ -146,7 +147,7 @@ def _read_study(folder: Path) -> dict[str, Any]:
 
 
 def _identity(study: Study) -> dict[str, Any]:
-    """What a folder remembers of its study; question and cases must agree for a run to resume."""
+    """The description of a study in its folder; a run resumes where question and cases are the same."""
     return {
         "name": study.name,
         "question": study.question,
@@ -155,13 +156,13 @@ def _identity(study: Study) -> dict[str, Any]:
     }
 
 
-def _stacked(frames: list[pd.DataFrame], columns: Mapping[str, str]) -> pd.DataFrame:
+def _stacked(frames: list[pd.DataFrame], columns: Iterable[str]) -> pd.DataFrame:
     filled = [frame for frame in frames if len(frame)]
     return pd.concat(filled, ignore_index=True) if filled else pd.DataFrame(columns=list(columns))
 
 
 def _storable(frame: pd.DataFrame) -> pd.DataFrame:
-    """A parquet column has one type: where a parameter has numbers in some cases and words in others, all are words."""
+    """The frame with one type a column: a parameter with numbers in some cases and words in others becomes words."""
     mixed = []
     for name, column in frame.items():
         types = {type(value) for value in column.dropna()} if is_object_dtype(column) else set()

@@ -1,4 +1,4 @@
-"""One page for a reader in a hurry: the question, the tables, how every case ended, the figures, the machine."""
+"""The report of a study on one page: its question, tables, endings of cases, figures, and facts of the machine."""
 
 from __future__ import annotations
 
@@ -14,7 +14,8 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
 from nlsolve.contracts.status import Status
-from nlsolve.results.verdicts import AT_A_SOLUTION, telling
+from nlsolve.results.parameters import differing_parameters
+from nlsolve.results.verdicts import AT_A_SOLUTION
 
 PRINTED_DOTS_PER_INCH = 200  # of the PNGs, see nlsolve.show.figures
 SCREEN_DOTS_PER_INCH = 110
@@ -33,8 +34,8 @@ def write_report(
     tables : name -> DataFrame, or its HTML, which is trusted; everything else is escaped.
     figures : (name, caption); figures/NAME.png in the folder is linked, and a missing one is said to be missing.
     """
-    failed = runs[~runs["status"].isin(AT_A_SOLUTION)]
-    parameters = telling(runs)
+    failed = runs[[status not in AT_A_SOLUTION for status in runs["status"].map(Status.of)]]
+    parameters = differing_parameters(runs)
     environment = Environment(
         loader=PackageLoader("nlsolve.show", ""), autoescape=True, undefined=StrictUndefined, keep_trailing_newline=True
     )
@@ -64,7 +65,7 @@ def write_report(
 
 
 def machine_facts() -> dict[str, str]:
-    """What the numbers of a report depend on besides the study."""
+    """Versions of libraries and the number of processors, on which the numbers of a report depend."""
     versions = {name: _version(name) for name in ("nlsolve", "numpy", "scipy")}
     return {**versions, "Python": platform.python_version(), "processors": str(os.cpu_count() or "unknown")}
 
@@ -93,11 +94,9 @@ def _figure(folder: Path, name: str, caption: str) -> dict[str, Any]:
 
 
 def _sentence(run: pd.Series) -> str:
-    """The case's own message, or else what its status means."""
+    """The message of a case, or the sentence of its status where it left none."""
     message = run.get("message")
-    if isinstance(message, str) and message:
-        return message
-    return next((status.sentence for status in Status if status.word == run["status"]), "no message was left")
+    return message if isinstance(message, str) and message else Status.of(run["status"]).sentence
 
 
 def _missing(value: Any) -> bool:

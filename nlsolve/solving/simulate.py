@@ -17,7 +17,7 @@ from nlsolve.contracts.problem import NonlinearProblem
 from nlsolve.contracts.rules.refresh import RefreshRule
 from nlsolve.contracts.scene import Scene, Solve
 from nlsolve.contracts.status import SolveError, Status
-from nlsolve.results.columns import REPORTED
+from nlsolve.results.columns import REPORTED, run_columns
 from nlsolve.results.frames import steps_frame
 from nlsolve.series import Array
 from nlsolve.solving.driver import solve
@@ -176,12 +176,12 @@ class _Run:
         return {
             "status": status.word,
             "message": "; ".join(filter(None, (said, place))),
-            "said_converged_but_is_not": self.false_convergence,
-            "said_failed_but_is": self.false_failure,
+            "false_convergence": self.false_convergence,
+            "false_failure": self.false_failure,
             **self.blame,
             "increments": self.increments,
             "iterations": self.iterations,
-            "branches": self.tangent.branches,
+            "tangents": self.tangent.branches,
             "validity_time": validity,
             **ledger.work(),
             **reported(self.rows),
@@ -189,8 +189,7 @@ class _Run:
             "seconds_all": ledger.seconds["method"] + ledger.seconds["operators"] + start.seconds["stage"],
             **self.tangent.facts(),
             "residual_norm": self.residual_norm,
-            **self.simulation.sizes,
-            **self.simulation.measured(outcome),
+            **run_columns({**self.simulation.sizes, **self.simulation.measured(outcome)}),
         }
 
 

@@ -17,7 +17,7 @@ from nlsolve.contracts.rules.refresh import RefreshRule
 from nlsolve.contracts.scene import Misfit, Scene, Section
 from nlsolve.registry.problems import ABSENT, Problem, problems_in, unknown
 from nlsolve.registry.registry import CONTRACTS, Registry
-from nlsolve.results.verdicts import names_settings
+from nlsolve.results.parameters import names_settings
 from nlsolve.solving.stopping import Budget, StoppingTest
 from nlsolve.study.sweeps import Document, Point, leaves
 

@@ -12,12 +12,12 @@ from typing import Any
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from nlsolve.registry.problems import ABSENT, Problem, Source, StudyError, did_you_mean, problems_in, unknown
+from nlsolve.registry.problems import ABSENT, Problem, Source, StudyError, problems_in, unknown
 from nlsolve.registry.registry import Registry, load_registry
 from nlsolve.registry.toml_lines import Place, lines_of
-from nlsolve.results.columns import RUNS
+from nlsolve.results.columns import RUNS, no_such_column
+from nlsolve.results.parameters import VARIANT, names_settings
 from nlsolve.results.reference_error import REFERENCE
-from nlsolve.results.verdicts import VARIANT, names_settings
 from nlsolve.show.figures import FigureSpec
 from nlsolve.show.tables import TableSpec, check
 from nlsolve.study.case import Case, Composer, Invalid
@@ -121,7 +121,7 @@ class _Builder:
             problems += [Problem(("table", number, *wrong.place), wrong.value, wrong.expected) for wrong in found]
         known = list(dict.fromkeys([*RUNS, *(name for case in cases for name in case.parameters)]))
         problems += [
-            Problem(("figure", number, name), column, f"no such column of the results; {did_you_mean(column, known)}")
+            Problem(("figure", number, name), column, no_such_column(column, known))
             for number, figure in enumerate(frame.figure)
             for name, columns in figure.columns_of_runs().items()
             for column in columns

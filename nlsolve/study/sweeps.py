@@ -15,7 +15,8 @@ from nlsolve.contracts.component import Component
 from nlsolve.registry.problems import Problem, StudyError
 from nlsolve.registry.toml_lines import Place
 from nlsolve.results.aggregates import COUNT, WITHIN
-from nlsolve.results.verdicts import OUTCOME, SOLVED, SPEEDUP, VARIANT, names_settings
+from nlsolve.results.parameters import VARIANT, names_settings
+from nlsolve.results.verdicts import OUTCOME, SOLVED, SPEEDUP
 
 Document = dict[str, Any]
 

@@ -256,7 +256,7 @@ def test_the_row_of_a_system() -> None:
     assert set(record.steps.columns) <= set(STEPS)
     assert len(record.fields) == 0
     assert (row["unknowns"], row["increments"], row["root_singular"]) == (4, 1, True)
-    assert row["iterations"] == row["branches"] == row["jacobians"] == row["factorizations"] == 17
+    assert row["iterations"] == row["tangents"] == row["jacobians"] == row["factorizations"] == 17
     assert row["residual_norm"] <= 1e-9
     assert row["ordering"] == "colamd"
     assert row["seconds"] > 0.0

@@ -123,12 +123,12 @@ def test_a_kept_tangent_serves_all_iterations_of_the_pressure(name: str) -> None
     """The pressure only moves the right-hand side: Newton pays a factorisation each time, a kept tangent few in all."""
     discretizer = DISCRETIZERS[name]
     newton, expected = solved(tool("orbit"), discretizer=discretizer)
-    assert newton["branches"] > newton["pressure_iterations"]
+    assert newton["tangents"] > newton["pressure_iterations"]
     others = ((ModifiedNewton(), PoorContraction(), 2), (AsymptoticNumericalMethod(), RangeUnderOne(), 6))
     for solver, refresh, most in others:
         kept, velocity = solved(tool("orbit"), discretizer=discretizer, solver=solver, refresh=refresh)
-        assert kept["branches"] <= most < kept["pressure_iterations"]
-        assert kept["factorizations"] == kept["branches"]
+        assert kept["tangents"] <= most < kept["pressure_iterations"]
+        assert kept["factorizations"] == kept["tangents"]
         assert kept["triangular_solves"] > kept["pressure_iterations"]
         np.testing.assert_allclose(velocity, expected, rtol=0.0, atol=1e-6 * np.abs(expected).max())
 

@@ -320,7 +320,7 @@ def test_one_step_of_every_increment_is_accepted_and_all_are_told() -> None:
 
 def test_a_tangent_that_is_never_renewed_is_valid_to_the_end() -> None:
     record = march(setup(marching(4), 1.0, solver=ModifiedNewton(), refresh=Never()))
-    assert record.summary["branches"] == 1
+    assert record.summary["tangents"] == 1
     assert record.summary["factorizations"] == 1
     assert record.summary["validity_time"] == pytest.approx(4 * DT)
 
@@ -329,15 +329,15 @@ def test_validity_ends_with_the_last_increment_the_first_tangent_served_alone() 
     """Renewed after every m iterations: in the increment in which that falls the first tangent no longer serves."""
     record = march(setup(marching(6), 0.5, solver=ModifiedNewton(), refresh=EveryM(m=9)))
     steps = record.steps
-    renewed = int(steps.loc[steps["branch"] > 1, "increment"].min())
+    renewed = int(steps.loc[steps["tangents"] > 1, "increment"].min())
     assert renewed > 1
     assert record.summary["validity_time"] == pytest.approx((renewed - 1) * DT)
-    assert record.summary["branches"] == steps["branch"].max()
+    assert record.summary["tangents"] == steps["tangents"].max()
 
 
 def test_a_tangent_renewed_in_the_first_increment_was_valid_for_none() -> None:
     record = march(setup(marching(3), 0.3, solver=Newton(), refresh=EveryIteration()))
-    assert record.steps.query("increment == 1")["branch"].max() > 1
+    assert record.steps.query("increment == 1")["tangents"].max() > 1
     assert record.summary["validity_time"] == 0.0
 
 

@@ -14,7 +14,7 @@ from nlsolve_scenes import Channel, EccentricCylinders, StirringTool
 from nlsolve_scenes.nodes.rings import GradedRings, Rings
 
 from nlsolve import SolveError, Status
-from nlsolve.cli.app import left_out
+from nlsolve.cli.printing import left_out
 from nlsolve.flow.momentum import Flow
 from nlsolve.flow.validity import HEAT_CAPACITY, LIMITS, audit
 from nlsolve.plugin import Cloud, ConstitutiveLaw

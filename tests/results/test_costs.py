@@ -29,7 +29,7 @@ from nlsolve.registry.problems import StudyError
 from nlsolve.results.columns import RUNS
 from nlsolve.results.costs.cost_prediction import UNITS, with_predictions
 from nlsolve.results.costs.crossover import OTHER, SAME, TIE, Crossover
-from nlsolve.results.costs.lower_envelope import at_best, envelope, under, wins
+from nlsolve.results.costs.lower_envelope import at_best, lower_envelope, under, wins
 from nlsolve.results.costs.unit_costs import COUNTS, UnitCosts
 from nlsolve.running.forecast import forecast
 from nlsolve.running.runner import run as run_study
@@ -323,7 +323,7 @@ lines = st.lists(
 @given(lines, st.floats(0.0, 1e4))
 def test_the_envelope_is_the_lowest_line_everywhere(drawn: list[tuple[int, float]], ratio: float) -> None:
     slopes, rests = np.array(drawn, dtype=float).T
-    intervals = envelope(slopes, rests)
+    intervals = lower_envelope(slopes, rests)
     assert intervals[0][1] == 0.0
     assert intervals[-1][2] == np.inf
     assert all(high == low for (_, _, high), (_, low, _) in pairwise(intervals))
@@ -335,7 +335,7 @@ def test_the_envelope_is_the_lowest_line_everywhere(drawn: list[tuple[int, float
 @given(lines)
 def test_a_line_at_its_best_is_as_near_as_brute_force_finds_it(drawn: list[tuple[int, float]]) -> None:
     slopes, rests = np.array(drawn, dtype=float).T
-    intervals = envelope(slopes, rests)
+    intervals = lower_envelope(slopes, rests)
     ends = [low for _, low, _ in intervals]
     across = np.r_[ends, np.geomspace(1e-3, 1e7, 400)]
     costs = slopes[:, None] * across + rests[:, None]
@@ -358,9 +358,9 @@ def test_under_is_where_the_difference_is_negative(slope: int, rest: float, rati
 
 
 def test_wins_for_people() -> None:
-    intervals = envelope([50, 4, 1], [10.0, 56.0, 500.0])
+    intervals = lower_envelope([50, 4, 1], [10.0, 56.0, 500.0])
     assert [wins(line, intervals) for line in range(3)] == ["0 … 1", "1 … 148", "148 … ∞"]
-    assert wins(1, envelope([50, 60, 1], [10.0, 56.0, 500.0])) == "never"
+    assert wins(1, lower_envelope([50, 60, 1], [10.0, 56.0, 500.0])) == "never"
 
 
 # The reports.
@@ -535,7 +535,7 @@ def timed(monkeypatch: pytest.MonkeyPatch) -> list[float]:
         taken = seconds.pop(0)
         if taken < 0:
             raise ZeroDivisionError
-        return Record({"status": "converged", "message": "", "seconds": taken, "branches": 1}, pd.DataFrame())
+        return Record({"status": "converged", "message": "", "seconds": taken, "tangents": 1}, pd.DataFrame())
 
     monkeypatch.setattr("nlsolve.running.runner.run_case", march_of)
     return seconds

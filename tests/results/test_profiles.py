@@ -15,8 +15,9 @@ from matplotlib.lines import Line2D
 from pydantic import TypeAdapter, ValidationError
 from scipy.stats import binom
 
+from nlsolve.results.parameters import differing_parameters
 from nlsolve.results.profiles import band, ratios, wilson, within
-from nlsolve.results.verdicts import solved, telling
+from nlsolve.results.verdicts import solved
 from nlsolve.show.figures import BaseFigure, FigureError, FigureSpec, draw
 
 ADAPTER: TypeAdapter[BaseFigure] = TypeAdapter(FigureSpec)
@@ -96,6 +97,18 @@ def test_a_band_is_the_binomial_one() -> None:
     np.testing.assert_array_equal([low, high], again)
     wide = band(cost, np.array([2.0]), 0.99, 20_000, 0)
     assert wide[0] < low < high < wide[1]
+
+
+def test_of_a_single_problem_nothing_can_be_drawn_anew() -> None:
+    low, high = band(np.array([[3.0], [INF]]), np.array([1.0, 4.0]), 0.9, 100, 0)
+    assert low.tolist() == high.tolist() == [[0.0, 1.0], [0.0, 0.0]]
+
+
+def test_all_strategies_are_given_the_same_draws() -> None:
+    cost = np.random.default_rng(1).lognormal(size=12)
+    low, high = band(np.stack([cost, cost]), np.array([0.5, 1.0, 2.0]), 0.9, 100, 0)
+    np.testing.assert_array_equal(low[0], low[1])
+    np.testing.assert_array_equal(high[0], high[1])
 
 
 def test_wilsons_interval() -> None:
@@ -290,8 +303,8 @@ def test_names_of_settings_settle_what_they_assign() -> None:
             "record": ["[]", "[]", "[]", "[1.0]"],
         }
     )
-    assert telling(frame) == ["strategy", "trial"]
-    assert telling(pd.concat([frame, frame]).assign(**{"start.seed": [0] * 4 + [1] * 4})) == [
+    assert differing_parameters(frame) == ["strategy", "trial"]
+    assert differing_parameters(pd.concat([frame, frame]).assign(**{"start.seed": [0] * 4 + [1] * 4})) == [
         "strategy",
         "trial",
         "start.seed",

@@ -57,7 +57,7 @@ def test_in_memory(study, tmp_path):
     results = run(study)
     assert isinstance(results, Results)
     assert results.folder is None
-    assert results.runs["branches"].tolist() == [60, 80, 30, 40]
+    assert results.runs["tangents"].tolist() == [60, 80, 30, 40]
     assert results.runs["case"].tolist() == [case.id for case in study.cases]
     assert list(results.runs.columns) == [*RUNS, *study.cases[0].parameters]
     assert set(results.steps.columns) <= set(STEPS)
@@ -82,7 +82,7 @@ def test_files(tmp_path):
     frames = {"runs.parquet", "runs.csv", "steps.parquet", "steps.csv", "fields.parquet"}
     assert names == tables | figures | frames | {"study.json", "report.html"}
     assert results.notes == ()
-    assert pd.read_parquet(folder / "runs.parquet")["branches"].tolist() == [60, 80, 30, 40]
+    assert pd.read_parquet(folder / "runs.parquet")["tangents"].tolist() == [60, 80, 30, 40]
     assert "How many branches?" in (folder / "report.html").read_text(encoding="utf-8")
 
 
@@ -111,7 +111,7 @@ def test_a_crash_is_a_row_that_says_what_and_where(study, tmp_path, monkeypatch,
     assert message.startswith("ZeroDivisionError: by a plugin (")
     assert f"{Path(__file__).name}:" in message
     assert results.runs["solver.tolerance"].iloc[1] == 1e-8
-    assert np.isnan(results.runs["branches"].iloc[1])
+    assert np.isnan(results.runs["tangents"].iloc[1])
     assert results.table("branches").loc[10, 1e-8] == "crashed"
     failing_on(monkeypatch, 99, ZeroDivisionError())
     assert run(study, tmp_path / "out").runs["status"].tolist() == ["converged"] * 4
@@ -122,10 +122,10 @@ def test_an_interruption_leaves_what_is_finished(study, tmp_path, monkeypatch, m
     failing_on(monkeypatch, 3, KeyboardInterrupt())
     with pytest.raises(KeyboardInterrupt):
         run(study, tmp_path / "out")
-    assert pd.read_parquet(tmp_path / "out" / "runs.parquet")["branches"].tolist() == [60, 80]
+    assert pd.read_parquet(tmp_path / "out" / "runs.parquet")["tangents"].tolist() == [60, 80]
     assert len(pd.read_csv(tmp_path / "out" / "steps.csv")) == 4
     monkeypatch.setattr("nlsolve.running.runner.run_case", march)
-    assert run(study, tmp_path / "out").runs["branches"].tolist() == [60, 80, 30, 40]
+    assert run(study, tmp_path / "out").runs["tangents"].tolist() == [60, 80, 30, 40]
     assert len(marched) == 2, "the two finished cases were not run again"
 
 
@@ -182,7 +182,7 @@ def test_paths_dictionaries_and_studies(tmp_path, study, monkeypatch):
     path = write_study(tmp_path)
     assert len(run(path).runs) == 4
     assert run(str(path), quick=True).runs["scene.side"].tolist() == ["right"]
-    assert run(path, overrides={"solver.order": 5}).runs["branches"].tolist() == [120, 160]
+    assert run(path, overrides={"solver.order": 5}).runs["tangents"].tolist() == [120, 160]
     document = {
         "question": "?",
         "scene": {"kind": "box"},

@@ -21,7 +21,7 @@ def study(tmp_path) -> Study:
 
 def part(study: Study, number: int = 0, **run) -> Part:
     case = study.cases[number]
-    row = {"case": case.id, "status": "converged", "message": "", "branches": 3, **run, **case.parameters}
+    row = {"case": case.id, "status": "converged", "message": "", "tangents": 3, **run, **case.parameters}
     return Part(
         row, pd.DataFrame({"case": case.id, "range": [1.0, None]}), pd.DataFrame({"case": [case.id], "u": [1.0]})
     )
@@ -78,6 +78,15 @@ def test_another_study_or_other_settings(tmp_path, study):
     assert json.loads((tmp_path / "out" / "study.json").read_text())["tables"][0]["name"] == "b"
 
 
+@pytest.mark.parametrize("status", ["crashed", "not applicable", "condensed"])
+def test_a_part_without_a_usable_ending_is_computed_again(tmp_path, study, status):
+    store = Store(tmp_path / "out", study)
+    store.save(part(study, 0))
+    assert store.load(study.cases[0].id) is not None
+    store.save(part(study, 0, status=status))
+    assert store.load(study.cases[0].id) is None
+
+
 def test_a_folder_that_cannot_be_written(tmp_path, study):
     (tmp_path / "file").write_text("")
     with pytest.raises(
@@ -122,6 +131,6 @@ def test_files_and_mixed_parameters(tmp_path, study):
         "fields.parquet",
     }
     assert pd.read_parquet(folder / "runs.parquet")["odd"].tolist()[:2] == ["1", "one"]
-    assert pd.read_csv(folder / "runs.csv")["branches"].tolist() == [3, 3, 3]
+    assert pd.read_csv(folder / "runs.csv")["tangents"].tolist() == [3, 3, 3]
     specs, runs = read_tables(folder)
     assert (specs[0].name, len(runs)) == ("branches", 3)

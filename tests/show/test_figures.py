@@ -70,7 +70,7 @@ def frames() -> dict[str, pd.DataFrame]:
     ]
     runs = pd.DataFrame(cases, columns=["case", "solver.kind", "solver.order", "solver.tolerance"])
     runs["status"] = ["converged"] * 3 + ["diverged"]
-    runs["branches"] = [208, 88, 94, 2252]
+    runs["tangents"] = [208, 88, 94, 2252]
     runs["velocity_error"] = np.nan
     runs["scene.increment"] = 0.01
     time = np.repeat(np.arange(1, 61) * 0.01, 2)
@@ -148,9 +148,9 @@ def test_a_failed_case_says_so_in_the_legend(frames: dict[str, pd.DataFrame]) ->
 
 def test_runs_are_sorted_and_failures_crossed_out(frames: dict[str, pd.DataFrame]) -> None:
     shuffled = frames | {"runs": frames["runs"].iloc[[3, 1, 0, 2]]}
-    figure = picture(shuffled, kind="line", source="runs", x="branches", y="solver.order", where=ANM)
+    figure = picture(shuffled, kind="line", source="runs", x="tangents", y="solver.order", where=ANM)
     np.testing.assert_array_equal(figure.axes[0].lines[0].get_xdata(), [88, 208])
-    figure = picture(shuffled, kind="line", source="runs", x="solver.kind", y="branches", log="y")
+    figure = picture(shuffled, kind="line", source="runs", x="solver.kind", y="tangents", log="y")
     assert legend(figure) == ["not converged"]
     assert [label.get_text() for label in figure.axes[0].get_xticklabels()] == ["newton", "anm"]
 
@@ -324,9 +324,9 @@ def test_a_field_at_rest_is_drawn(frames: dict[str, pd.DataFrame]) -> None:
             "log": "y",
             "group": ["solver.kind", "solver.order", "solver.tolerance"],
         },
-        {"kind": "line", "source": "runs", "x": "solver.order", "y": "branches", "group": "solver.tolerance"},
-        {"kind": "map", "x": "solver.order", "y": ["solver.kind", "solver.tolerance"], "value": "branches"},
-        {"kind": "trade", "x": "branches", "y": "solver.tolerance", "group": "solver.order"},
+        {"kind": "line", "source": "runs", "x": "solver.order", "y": "tangents", "group": "solver.tolerance"},
+        {"kind": "map", "x": "solver.order", "y": ["solver.kind", "solver.tolerance"], "value": "tangents"},
+        {"kind": "trade", "x": "tangents", "y": "solver.tolerance", "group": "solver.order"},
         {"kind": "cloud", "time": 0, "where": ONE, "probe": (0, 1.6)},
         {"kind": "profile", "axis": "y", "value": "u", "where": ANM},
         {"kind": "field", "value": "rate", "log": True, "where": ANM},
@@ -361,7 +361,10 @@ def test_pyplot_and_its_global_state_are_never_loaded() -> None:
     ("spec", "sentence"),
     [
         ({"kind": "line", "y": "rnage"}, r"column 'rnage' is not in `steps`; the nearest are range"),
-        ({"kind": "line", "source": "runs", "x": "zzz", "y": "branches"}, r"'zzz' is not in `runs`; there are case"),
+        ({"kind": "line", "source": "runs", "x": "zzz", "y": "tangents"}, r"'zzz' is not in `runs`; there are case"),
+        ({"kind": "line", "y": "branch"}, r"column 'branch': this column is called tangents now$"),
+        ({"kind": "map", "x": "case", "y": "case", "value": "branches"}, r"this column is called tangents now$"),
+        ({"kind": "line", "y": "range", "where": {"said_failed_but_is": 0}}, r"is called false_failure now$"),
         (
             {"kind": "line", "y": "range", "where": {"solver.ordr": 20}},
             r"where 'solver.ordr' .* nearest are solver.order",
@@ -377,7 +380,7 @@ def test_pyplot_and_its_global_state_are_never_loaded() -> None:
         ),
         (
             {"kind": "line", "source": "runs", "x": "solver.order", "y": "velocity_error"},
-            r"'velocity_error' over x = 'solver.order' holds no number in the 4 runs .* branches",
+            r"'velocity_error' over x = 'solver.order' holds no number in the 4 runs .* tangents",
         ),
         ({"kind": "line", "y": "range", "group": "solver.oder"}, r"group 'solver.oder' is not in `runs`"),
         (

@@ -13,7 +13,9 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Polygon, Rectangle
 from pydantic import TypeAdapter, ValidationError
 
-from nlsolve.results.verdicts import cheapest, outcome, percent, telling
+from nlsolve.contracts.status import Status
+from nlsolve.results.parameters import differing_parameters
+from nlsolve.results.verdicts import cheapest, outcome, percent
 from nlsolve.show.figures import BaseFigure, FigureError, FigureSpec, draw
 from nlsolve.show.figures.map import code, short
 from nlsolve.show.figures.style import ACCENT, PAGE
@@ -183,7 +185,11 @@ def test_numbers_in_two_digits(value: float, column: str, expected: str) -> None
 
 
 def test_codes_and_percent() -> None:
-    assert [code(word) for word in ("budget spent", "diverged", "singular tangent")] == ["BS", "DIV", "ST"]
+    assert [code(status) for status in (Status.BUDGET_SPENT, Status.DIVERGED, Status.SINGULAR_TANGENT)] == [
+        "BS",
+        "DIV",
+        "ST",
+    ]
     assert [percent(value) for value in (0.01, 0.0005, 1e-6)] == ["1 %", "0.05 %", "1e-06"]
 
 
@@ -214,6 +220,6 @@ def test_the_cheapest_run() -> None:
 
 def test_what_tells_runs_apart() -> None:
     runs = pd.DataFrame({"variant": ["a", "b", "a", "b"], "law.index": [1, 2, 1, 2], "solver.order": [5, 5, 9, 9]})
-    assert telling(runs) == ["variant", "solver.order"]
-    assert telling(runs.drop(columns="variant")) == ["law.index", "solver.order"]
-    assert telling(runs[:1]) == []
+    assert differing_parameters(runs) == ["variant", "solver.order"]
+    assert differing_parameters(runs.drop(columns="variant")) == ["law.index", "solver.order"]
+    assert differing_parameters(runs[:1]) == []

@@ -20,7 +20,7 @@ RUNS = pd.DataFrame(
         "case": ["a1", "b2", "c3"],
         "status": ["converged", "diverged", "singular tangent"],
         "message": ["fine", "the residual grew <fast> & far", None],
-        "branches": [88, 2, 1],
+        "tangents": [88, 2, 1],
         "solver.order": [20.0, 10.0, np.nan],
         "solver.kind": ["anm", "anm", "newton"],
         "law.index": [0.1324, 0.1324, 0.1324],
@@ -30,7 +30,7 @@ RUNS = pd.DataFrame(
 
 @pytest.fixture
 def page(tmp_path: Path) -> str:
-    figure = draw(LineFigure(name="runs", source="runs", x="solver.order", y="branches"), RUNS, RUNS, RUNS)
+    figure = draw(LineFigure(name="runs", source="runs", x="solver.order", y="tangents"), RUNS, RUNS, RUNS)
     save(figure, tmp_path / "figures", "runs")
     tables: dict[str, str | pd.DataFrame] = {
         "branches <by> order": pd.DataFrame({"η = 1e-06": [208, 88]}, index=["<10>", "20"]),

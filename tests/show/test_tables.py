@@ -22,7 +22,7 @@ def runs(**columns) -> pd.DataFrame:
             "status": "converged",
             "solver.order": [10, 10, 20, 20],
             "solver.tolerance": [1e-6, 1e-8, 1e-6, 1e-8],
-            "branches": [30.0, 40.0, 15.0, 20.0],
+            "tangents": [30.0, 40.0, 15.0, 20.0],
             "seconds": [1.5, 2.25, 1e-7, np.nan],
         }
     ).assign(**columns)
@@ -30,7 +30,7 @@ def runs(**columns) -> pd.DataFrame:
 
 
 def spec(**fields) -> TableSpec:
-    given = {"name": "t", "rows": "solver.order", "columns": "solver.tolerance", "value": "branches"}
+    given = {"name": "t", "rows": "solver.order", "columns": "solver.tolerance", "value": "tangents"}
     return TableSpec.model_validate(given | fields)
 
 
@@ -43,8 +43,8 @@ def test_one_value_by_rows_and_columns():
 
 
 def test_several_values_without_columns_and_several_rows():
-    table = build(spec(columns=[], rows=["solver.order", "solver.tolerance"], value=["branches", "seconds"]), runs())
-    assert list(table.cells.columns) == ["branches", "seconds"]
+    table = build(spec(columns=[], rows=["solver.order", "solver.tolerance"], value=["tangents", "seconds"]), runs())
+    assert list(table.cells.columns) == ["tangents", "seconds"]
     assert table.cells.index.names == ["solver.order", "solver.tolerance"]
     assert table.words.loc[(10, 1e-8), "seconds"] == "2.25"
     assert table.words.loc[(20, 1e-6), "seconds"] == "1e-07"
@@ -52,7 +52,7 @@ def test_several_values_without_columns_and_several_rows():
 
 
 def test_several_values_by_columns():
-    table = build(spec(value=["branches", "seconds"]), runs())
+    table = build(spec(value=["tangents", "seconds"]), runs())
     assert table.cells.shape == (2, 4)
     assert table.cells.loc[10, (1e-8, "seconds")] == 2.25
     assert "1e-08 · seconds" in table.markdown()
@@ -80,8 +80,10 @@ def test_several_runs_in_one_cell():
 
 
 def test_unknown_names():
-    with pytest.raises(StudyError, match="table 't': no such column of the results; did you mean 'branches'"):
-        build(spec(value="brances"), runs())
+    with pytest.raises(StudyError, match=r"table 't': value = 'tangens': no such .*; did you mean 'tangents'"):
+        build(spec(value="tangens"), runs())
+    with pytest.raises(StudyError, match=r"^table 't': value = 'branches': this column is called tangents now$"):
+        build(spec(value="branches"), runs())
     with pytest.raises(StudyError, match=r"no case has these values: solver\.order = 11"):
         build(spec(where={"solver.order": 11}), runs())
 

@@ -313,10 +313,17 @@ class TestComplaints:
         assert "line 13: start.by = 'idx': the law 'honey' is continued by index only" in message
 
     def test_tables_name_columns_that_exist(self, tmp_path):
-        message = complaint(tmp_path, ('value = "branches"', 'value = "brnches"'))
-        assert "line 22: table[0].value = 'brnches': no such column of the results; did you mean 'branches'?" in message
+        message = complaint(tmp_path, ('value = "tangents"', 'value = "tangnts"'))
+        assert "line 22: table[0].value = 'tangnts': no such column of the results; did you mean 'tangents'?" in message
         message = complaint(tmp_path, ('rows = "solver.order"', 'rows = "solver.ordr"'))
         assert "line 20: table[0].rows = 'solver.ordr'" in message
+
+    def test_an_old_column_is_answered_with_its_new_name(self, tmp_path):
+        message = complaint(tmp_path, ('value = "tangents"', 'value = "branches"'))
+        assert message.endswith("line 22: table[0].value = 'branches': this column is called tangents now")
+        figure = '[[figure]]\nkind = "line"\nname = "f"\nsource = "runs"\nx = "solver.order"\ny = "branches"\n[quick]'
+        message = complaint(tmp_path, ("[quick]", figure))
+        assert message.endswith("figure[0].y = 'branches': this column is called tangents now")
 
     def test_a_cell_with_several_runs_is_seen_before_anything_is_run(self, tmp_path):
         message = complaint(tmp_path, ('columns = "solver.tolerance"\n', ""))

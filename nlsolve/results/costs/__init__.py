@@ -1,1 +1,1 @@
-"""What a strategy costs by counts and unit costs, what it will cost elsewhere, and where which strategy wins."""
+"""What strategies cost by counts and unit costs, with any linear solver, and which one is cheapest where."""

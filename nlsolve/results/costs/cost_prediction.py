@@ -1,4 +1,4 @@
-"""Predicted seconds of runs: their counts, unit costs measured beside them, and what other runs say of own work."""
+"""seconds = Σ_kind n_kind c_kind + own work : predicted seconds of runs, from their counts and measured unit costs."""
 
 from __future__ import annotations
 
@@ -11,10 +11,22 @@ import pandas as pd
 from nlsolve.results.aggregates import grouped
 from nlsolve.results.columns import RUNS
 from nlsolve.results.costs.unit_costs import COUNTS, PREFIX, UnitCosts
+from nlsolve.results.frames import rows_of
 from nlsolve.results.verdicts import Run, number
 
-PROBLEM = ("scene", "law", "discretizer", "linear")
-"""Sections whose parameters settle what a unit of work costs."""
+OF_THE_METHOD = (
+    "solver",
+    "refresh",
+    "predictor",
+    "stop",
+    "budget",
+    "start",
+    "starter",
+    "record",
+    "counterpart",
+    "error_estimator",
+)
+"""Sections that do not change what a unit of work costs; all others do."""
 
 UNITS = tuple(name for name in RUNS if name.startswith(PREFIX))
 
@@ -23,20 +35,19 @@ def with_predictions(runs: pd.DataFrame) -> pd.DataFrame:
     """The runs with `seconds_predicted` filled in; NaN where no unit costs are known.
 
     Unit costs are medians over the runs of the same problem and linear solver. The method's own work in an iteration is
-    the median over the runs of the same case with other linear solvers, on which it does not depend; none is added
-    where there are none. So nothing is told from the seconds of the run itself.
+    the median over the runs of the same case with other linear solvers, on which it does not depend; it is left out
+    where there are none. So no prediction uses the seconds of the run itself.
     """
     if not any(name in runs and runs[name].notna().any() for name in UNITS):
         return runs
     parameters = [name for name in map(str, runs.columns) if name not in RUNS and "." in name]
-    of_cell = [name for name in parameters if name.split(".")[0] in PROBLEM]
+    of_cell = [name for name in parameters if name.split(".")[0] not in OF_THE_METHOD]
     of_case = [name for name in parameters if name.split(".")[0] != "linear"]
-    records = [dict(zip(map(str, runs.columns), row, strict=True)) for row in runs.itertuples(index=False)]
-    records = [{**run, "cell": _key(of_cell, run), "same case": _key(of_case, run)} for run in records]
-    units = {cell: pooled(members) for (cell,), members in grouped(records, ("cell",)).items()}
-    rivals = grouped(records, ("same case",))
+    rows = [{**run, "cell": _key(of_cell, run), "same case": _key(of_case, run)} for run in rows_of(runs)]
+    units = {cell: pooled(members) for (cell,), members in grouped(rows, ("cell",)).items()}
+    rivals = grouped(rows, ("same case",))
     seconds = []
-    for run in records:
+    for run in rows:
         unit = units[run["cell"]]
         others = [other for other in rivals[(run["same case"],)] if other["cell"] != run["cell"]]
         own = [

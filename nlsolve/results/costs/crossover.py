@@ -2,37 +2,43 @@
 
 At one number of nodes a strategy is a straight line: its counts do not depend on ρ, and `rest` (its solves, residuals,
 series, own work) is in the unit of the solve. The cheapest strategy by ρ is the lower envelope of these lines; the
-linear solvers measured are points on the ρ axis, and a cell is one of them at one number of nodes.
+measured linear solvers are points on the ρ axis, and a cell is one of them at one number of nodes.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Annotated, Any, ClassVar, Literal
+from typing import ClassVar, Literal
 
 import numpy as np
-from pydantic import BeforeValidator, Field
+from pydantic import Field
 
 from nlsolve.contracts.component import Component
 from nlsolve.contracts.status import Status
 from nlsolve.registry.problems import StudyError
 from nlsolve.results.aggregates import NO_RUN, grouped, key_of
 from nlsolve.results.costs.cost_prediction import pooled
-from nlsolve.results.costs.lower_envelope import at_best, envelope, under, wins
+from nlsolve.results.costs.lower_envelope import at_best, lower_envelope, under, wins
 from nlsolve.results.costs.unit_costs import UnitCosts
-from nlsolve.results.verdicts import Run, number
+from nlsolve.results.frames import Row
+from nlsolve.results.selection import Names
+from nlsolve.results.verdicts import Run, number, status_of
 from nlsolve.series import Array
 
-Names = Annotated[tuple[str, ...], BeforeValidator(lambda value: (value,) if isinstance(value, str) else value)]
-
 SAME, TIE, OTHER = "same", "tie", "other"
-"""Verdicts on a cell: the winner predicted is the one measured, or its rounds overlap with the latter's, or neither."""
+"""Verdicts on a cell: the strategy predicted to win is the one that wins, or its rounds overlap with the winner's, or
+neither.
+"""
 
 
 @dataclass(frozen=True)
 class Cell:
-    """One linear solver at one size: what its strategies took, and were predicted to take; arrays (S,) by strategy."""
+    """One linear solver at one size: the work and the seconds of its S strategies, arrays (S,).
+
+    seconds, slowest : of the fastest and of the slowest round.
+    predicted : seconds by the cost model.
+    """
 
     size: str
     backend: str
@@ -40,28 +46,30 @@ class Cell:
     strategies: tuple[str, ...]
     factorizations: Array
     seconds: Array
-    most: Array
-    forecast: Array
+    slowest: Array
+    predicted: Array
 
     @property
     def winners(self) -> tuple[int, int]:
-        """Positions of the strategy predicted, and of the one measured, to be cheapest."""
-        return int(self.forecast.argmin()), int(self.seconds.argmin())
+        """Positions of the cheapest strategy by prediction, and by measurement."""
+        return int(self.predicted.argmin()), int(self.seconds.argmin())
 
     @property
     def verdict(self) -> str:
-        """SAME, TIE or OTHER; a tie when the fastest round of the one predicted is within the rounds of the winner."""
-        told, won = self.winners
-        return SAME if told == won else TIE if self.seconds[told] <= self.most[won] else OTHER
+        """SAME, TIE or OTHER. A tie: the predicted winner's fastest round is no slower than the winner's slowest."""
+        predicted, measured = self.winners
+        if predicted == measured:
+            return SAME
+        return TIE if self.seconds[predicted] <= self.slowest[measured] else OTHER
 
     @property
     def rests(self) -> Array:
         """What a strategy costs besides its factorisations, in triangular solves of this cell."""
-        return (self.forecast - self.factorizations * self.unit.factorization) / self.unit.triangular_solve
+        return (self.predicted - self.factorizations * self.unit.factorization) / self.unit.triangular_solve
 
 
 class Crossover(Component):
-    """Which columns of `runs` tell strategies, sizes and linear solvers apart, and which report is shown."""
+    """A report on the cheapest strategies, by the columns of `runs` that tell strategies, sizes and solvers apart."""
 
     noun: ClassVar[str] = "crossover"
 
@@ -76,35 +84,32 @@ class Crossover(Component):
     against: str | None = Field(None, description="lines: a strategy that the others are compared with")
 
     def columns_of_runs(self) -> dict[str, tuple[str, ...]]:
-        """By field: the names of columns of `runs` that must be there."""
+        """Field -> the columns of `runs` that it names."""
         return {"strategy": self.strategy, "size": self.size, "backend": self.backend}
 
     @property
     def labels(self) -> tuple[str, ...]:
-        """Columns of the report that name its rows."""
+        """Columns of the report that tell its rows apart."""
         return ("size", "backend" if self.report == "cells" else "strategy")
 
     @property
     def shown(self) -> tuple[str, ...]:
-        """Columns of the report that hold its findings."""
+        """Columns of the report that hold its results."""
         if self.report == "cells":
             return ("ratio", "predicted", "measured", "verdict", "regret", "deviation", "spread")
         return ("factorizations", "rest", "wins", "at best", *([f"beats {self.against}"] if self.against else []))
 
-    def of(self, runs: Sequence[Run]) -> list[dict[str, Any]]:
+    def of(self, runs: Sequence[Run]) -> list[Row]:
         """The rows of the report. Raises StudyError, see `cells`."""
         cells = self.cells(runs)
-        rows = _cell_rows(cells) if self.report == "cells" else self._line_rows(cells)
-        return [{"status": Status.CONVERGED.word, **row} for row in rows]
+        return _cell_rows(cells) if self.report == "cells" else self._line_rows(cells)
 
     def cells(self, runs: Sequence[Run]) -> list[Cell]:
-        """All cells of the converged runs that have unit costs.
+        """The cells of the converged runs that have unit costs.
 
-        StudyError when there are none, or when two runs are one strategy of a cell.
+        Raises StudyError when there are none, or when a cell has two runs of one strategy.
         """
-        known = [
-            run for run in runs if run["status"] == Status.CONVERGED.word and number(run.get("seconds_predicted")) > 0
-        ]
+        known = [run for run in runs if status_of(run) is Status.CONVERGED and number(run.get("seconds_predicted")) > 0]
         if not known:
             raise StudyError("no run converged with unit costs, from which a crossover is told")
         found = []
@@ -126,11 +131,11 @@ class Crossover(Component):
             found.append(Cell(size, backend, unit, strategies, *numbers))
         return found
 
-    def _line_rows(self, cells: Sequence[Cell]) -> list[dict[str, Any]]:
+    def _line_rows(self, cells: Sequence[Cell]) -> list[Row]:
         rows = []
-        for cell in references(cells):
+        for cell in reference_cells(cells):
             slopes, rests = cell.factorizations, cell.rests
-            intervals = envelope(slopes, rests)
+            intervals = lower_envelope(slopes, rests)
             for s, strategy in enumerate(cell.strategies):
                 row = {
                     "size": cell.size,
@@ -147,8 +152,8 @@ class Crossover(Component):
         return rows
 
 
-def references(cells: Sequence[Cell]) -> list[Cell]:
-    """For each size the cell whose solves are the unit of the lines: the one of median ρ."""
+def reference_cells(cells: Sequence[Cell]) -> list[Cell]:
+    """For each size the cell of median ρ, whose triangular solve is the unit of cost of the lines."""
     found = []
     for members in by_size(cells).values():
         ordered = sorted(members, key=lambda cell: cell.unit.ratio)
@@ -157,28 +162,28 @@ def references(cells: Sequence[Cell]) -> list[Cell]:
 
 
 def by_size(cells: Sequence[Cell]) -> dict[str, list[Cell]]:
-    """The cells of each size, in their order."""
+    """Size -> its cells, in order of appearance."""
     sizes: dict[str, list[Cell]] = {}
     for cell in cells:
         sizes.setdefault(cell.size, []).append(cell)
     return sizes
 
 
-def _cell_rows(cells: Sequence[Cell]) -> list[dict[str, Any]]:
-    rows: list[dict[str, Any]] = []
+def _cell_rows(cells: Sequence[Cell]) -> list[Row]:
+    rows: list[Row] = []
     for cell in cells:
-        told, won = cell.winners
+        predicted, measured = cell.winners
         rows.append(
             {
                 "size": cell.size,
                 "backend": cell.backend,
                 "ratio": cell.unit.ratio,
-                "predicted": cell.strategies[told],
-                "measured": cell.strategies[won],
+                "predicted": cell.strategies[predicted],
+                "measured": cell.strategies[measured],
                 "verdict": cell.verdict,
-                "regret": cell.seconds[told] / cell.seconds[won] - 1.0,
-                "deviation": np.abs(cell.seconds / cell.forecast - 1.0).max(),
-                "spread": float(np.median(cell.most / cell.seconds)) - 1.0,
+                "regret": cell.seconds[predicted] / cell.seconds[measured] - 1.0,
+                "deviation": np.abs(cell.seconds / cell.predicted - 1.0).max(),
+                "spread": float(np.median(cell.slowest / cell.seconds)) - 1.0,
             }
         )
     same, tie = (sum(row["verdict"] == verdict for row in rows) for verdict in (SAME, TIE))
@@ -188,7 +193,7 @@ def _cell_rows(cells: Sequence[Cell]) -> list[dict[str, Any]]:
 
 
 def _words(names: tuple[str, ...], run: Run) -> str:
-    """ "anm, order 20": words as they are, numbers behind their column."""
+    """A run's values of some columns, "anm, order 20": words as they are, numbers behind the name of their column."""
     found = []
     for name, value in zip(names, key_of(names, run), strict=True):
         if not np.isnan(number(value)):

@@ -12,7 +12,7 @@ Interval = tuple[int, float, float]
 """Position of a line, and from where to where it is the lowest."""
 
 
-def envelope(slopes: Sequence[float] | Array, rests: Sequence[float] | Array) -> list[Interval]:
+def lower_envelope(slopes: Sequence[float] | Array, rests: Sequence[float] | Array) -> list[Interval]:
     """Which of the lines is lowest for 0 ≤ ρ < ∞, from left to right; of equals the first."""
     a, b = np.asarray(slopes, dtype=float), np.asarray(rests, dtype=float)
     here, low = int(np.lexsort((a, b))[0]), 0.0
@@ -29,13 +29,13 @@ def envelope(slopes: Sequence[float] | Array, rests: Sequence[float] | Array) ->
 
 
 def wins(line: int, intervals: Sequence[Interval]) -> str:
-    """ "18 … 130", or "never"."""
+    """Where a line is the lowest, "18 … 130", or "never"."""
     found = [f"{text(low)} … {text(high)}" for winner, low, high in intervals if winner == line]
     return found[0] if found else "never"
 
 
 def at_best(line: int, slopes: Array, rests: Array, intervals: Sequence[Interval]) -> str:
-    """ "1.4 at 30": the least cost over that of the lowest line, and the ρ there; "1" where it is the lowest itself.
+    """Least ratio of a line to the lowest one, and the ρ there, "1.4 at 30"; "1" for a line that is lowest somewhere.
 
     On an interval the quotient of two lines is monotonic, so it is least at an end.
     """
@@ -60,5 +60,5 @@ def under(slope: float, rest: float) -> str:
 
 
 def text(ratio: float) -> str:
-    """A ratio for people."""
+    """A ratio ρ in three digits."""
     return "∞" if ratio == np.inf else f"{ratio:.3g}"

@@ -56,10 +56,10 @@ class UnitCosts:
         )
 
     def columns(self) -> dict[str, float]:
-        """As columns of `runs`."""
+        """The unit costs as columns of `runs`."""
         return {PREFIX + kind: seconds for kind, seconds in asdict(self).items()}
 
     @classmethod
     def of_columns(cls, run: Mapping[str, Any]) -> Self:
-        """From columns of `runs`."""
+        """The unit costs in the columns of a row of `runs`."""
         return cls(**{kind: float(run[PREFIX + kind]) for kind in cls.__dataclass_fields__})

@@ -1,8 +1,8 @@
 """Figures a study declares, for print: curves, maps, trades, crossovers and solved problems of runs, curves of steps,
 clouds, profiles and fields.
 
-A figure is a validated value like everything else in a study; `draw` turns it and the result frames into a
-`matplotlib.figure.Figure` without touching pyplot, `save` writes it as PNG and PDF, the same bytes every time.
+`draw` makes a `matplotlib.figure.Figure` of a declared figure and the result frames, without pyplot; `save` writes it
+as PNG and PDF, the same bytes every time.
 """
 
 from __future__ import annotations

@@ -1,36 +1,35 @@
-"""What all kinds of figures have in common: the declaration, the frames they draw from, and how they refuse."""
+"""The base of all kinds of figures: name, caption, selection of runs, and the error when nothing can be drawn."""
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from difflib import get_close_matches
-from typing import Annotated, ClassVar
+from typing import ClassVar
 
 import pandas as pd
 from matplotlib.figure import Figure
-from pydantic import BeforeValidator, Field
+from pydantic import Field
 
 from nlsolve.contracts.component import Component
+from nlsolve.results.columns import RENAMED, no_such_column
 from nlsolve.results.frames import Frames
-
-Scalar = bool | int | float | str
-Names = Annotated[tuple[str, ...], BeforeValidator(lambda value: (value,) if isinstance(value, str) else value)]
+from nlsolve.results.selection import Names, Where
 
 
 class FigureError(ValueError):
-    """A declared figure cannot be drawn from these results; the sentence says which, why, and what there is instead."""
+    """A declared figure cannot be drawn from these results; its sentence says why, and what there is instead."""
 
 
 class BaseFigure(Component, ABC):
-    """What all kinds of figures have in common."""
+    """A figure as a study declares it: a kind adds its fields and paints itself."""
 
     noun: ClassVar[str] = "figure"
 
     name: str = Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_-]*$", description="stem of the files written")
     caption: str = Field("", description="sentence under the figure in the report")
     title: str | None = Field(None, description="heading inside the figure; papers do without")
-    where: dict[str, Scalar | list[Scalar]] = Field(
+    where: Where = Field(
         default_factory=dict, description="runs column -> value, or list of values, a case must have to be drawn"
     )
     group: Names = Field(
@@ -39,7 +38,7 @@ class BaseFigure(Component, ABC):
     )
 
     def columns_of_runs(self) -> dict[str, Names]:
-        """By field: the names a study can be told to be no columns of `runs` before it is run."""
+        """Field -> the columns of `runs` that it names, which a study checks before it is run."""
         return {"where": tuple(self.where), "group": self.group}
 
     @abstractmethod
@@ -47,13 +46,15 @@ class BaseFigure(Component, ABC):
         """Draw on an empty figure."""
 
     def refuse(self, sentence: str) -> FigureError:
-        """The exception for this figure, by name."""
+        """The exception that says why this figure cannot be drawn."""
         return FigureError(f'figure "{self.name}": {sentence}')
 
     def require(self, column: str, frame: pd.DataFrame, source: str, what: str = "column") -> None:
-        """Refuse when the frame called `source` has no such column."""
+        """Raise FigureError when the frame called `source` has no such column."""
         if column in frame:
             return
+        if column in RENAMED:
+            raise self.refuse(f"{what} {column!r}: {no_such_column(column, map(str, frame))}")
         there = [str(name) for name in frame]
         near = get_close_matches(column, there, n=3)
         known = f"the nearest are {listing(near)}" if near else f"there are {listing(there)}"
@@ -61,6 +62,6 @@ class BaseFigure(Component, ABC):
 
 
 def listing(names: Sequence[str], most: int = 12) -> str:
-    """Names for a sentence; how many more there are when there are many."""
+    """Names with commas between; of more than `most`, the first ones and how many more there are."""
     shown = ", ".join(names[:most]) or "none"
     return shown if len(names) <= most else f"{shown} and {len(names) - most} more"

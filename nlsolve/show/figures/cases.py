@@ -1,4 +1,4 @@
-"""Which cases a figure shows, and what they are called in it."""
+"""Which cases a figure shows, and by which words it tells them apart."""
 
 from __future__ import annotations
 
@@ -7,22 +7,21 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
 from nlsolve.contracts.status import Status
-from nlsolve.results.verdicts import telling
-from nlsolve.show.figures.base import BaseFigure, Scalar, listing
+from nlsolve.results.parameters import differing_parameters
+from nlsolve.results.selection import is_wanted
+from nlsolve.show.figures.base import BaseFigure, listing
 
 
 def select(spec: BaseFigure, runs: pd.DataFrame) -> pd.DataFrame:
-    """The runs that have every value `where` asks for."""
+    """The runs that have every value that `where` asks for. Raises FigureError when there are none."""
     if runs.empty:
         raise spec.refuse("there are no runs to draw")
     for column, wanted in spec.where.items():
         spec.require(column, runs, "runs", what="where")
-        values = wanted if isinstance(wanted, list) else [wanted]
-        fit = np.logical_or.reduce([_equals(runs[column], value) for value in values])
-        if not fit.any():
+        fit = [is_wanted(value, wanted) for value in runs[column]]
+        if not any(fit):
             there = list(dict.fromkeys(repr(value) for value in runs[column].tolist()))
             raise spec.refuse(f"no case has {column} = {wanted!r}; the cases left have {listing(there)}")
         runs = runs[fit]
@@ -30,12 +29,16 @@ def select(spec: BaseFigure, runs: pd.DataFrame) -> pd.DataFrame:
 
 
 def labelled(spec: BaseFigure, cases: pd.DataFrame, one_case: bool) -> list[tuple[str, pd.DataFrame]]:
-    """The cases group by group, in their order, each with the words that tell it apart."""
+    """Label and cases of every group, in order of appearance.
+
+    one_case : whether a group is a single case; without `group`, cases are then told apart by the parameters that
+        differ. Raises FigureError when a group is left with several.
+    """
     by = list(spec.group)
     for column in by:
         spec.require(column, cases, "runs", what="group")
     if not by and one_case and len(cases) > 1:
-        by = telling(cases) or ["case"]
+        by = differing_parameters(cases) or ["case"]
     if not by:
         return [("", cases)]
     groups: dict[tuple[str, ...], list[int]] = {}
@@ -48,15 +51,10 @@ def labelled(spec: BaseFigure, cases: pd.DataFrame, one_case: bool) -> list[tupl
         if one_case and len(members) > 1:
             raise spec.refuse(
                 f"group = {by} leaves {len(members)} cases under the one label {label!r}; "
-                f"they differ in {listing(telling(members))}: add one to `group`, or choose with `where`"
+                f"they differ in {listing(differing_parameters(members))}: add one to `group`, or choose with `where`"
             )
         found.append((label, members))
     return found
-
-
-def records_of(runs: pd.DataFrame) -> list[dict[str, Any]]:
-    """The runs one by one, in their order."""
-    return [dict(zip(map(str, runs.columns), row, strict=True)) for row in runs.itertuples(index=False)]
 
 
 def label_of(parameters: Mapping[str, Any]) -> str:
@@ -89,14 +87,7 @@ def number_text(value: Any) -> str:
     return f"$10^{{{int(power)}}}$" if mantissa == "1" else rf"${mantissa}\times 10^{{{int(power)}}}$"
 
 
-def _equals(column: pd.Series, value: Scalar) -> NDArray[np.bool_]:
-    if isinstance(value, str):
-        return column.astype(str).to_numpy() == value
-    numbers = pd.to_numeric(column, errors="coerce").to_numpy(float, na_value=np.nan)
-    return np.isclose(numbers, float(value), rtol=1e-9, atol=0)
-
-
 def ending(run: pd.Series) -> str:
-    """The status of a case that did not converge; empty for one that did."""
-    status = str(run.get("status", Status.CONVERGED.word))
-    return "" if status == Status.CONVERGED.word else status
+    """The word for the status of a case that did not converge; empty for one that did."""
+    status = Status.of(run["status"])
+    return "" if status is Status.CONVERGED else status.word

@@ -1,4 +1,4 @@
-"""Which strategy wins as a factorisation grows dear: predicted lines, their envelope, and the cells measured."""
+"""Which strategy is cheapest by the price of a factorisation: predicted lines, their envelope, and measured runs."""
 
 from __future__ import annotations
 
@@ -11,11 +11,12 @@ from matplotlib.lines import Line2D
 from pydantic import Field
 
 from nlsolve.registry.problems import StudyError
-from nlsolve.results.costs.crossover import OTHER, Cell, Crossover, by_size, references
-from nlsolve.results.costs.lower_envelope import envelope
-from nlsolve.results.frames import Frames
-from nlsolve.show.figures.base import BaseFigure, Names
-from nlsolve.show.figures.cases import records_of, select
+from nlsolve.results.costs.crossover import OTHER, Cell, Crossover, by_size, reference_cells
+from nlsolve.results.costs.lower_envelope import lower_envelope
+from nlsolve.results.frames import Frames, rows_of
+from nlsolve.results.selection import Names
+from nlsolve.show.figures.base import BaseFigure
+from nlsolve.show.figures.cases import select
 from nlsolve.show.figures.style import ACCENT, PAGE, curve_style, join, legend_outside
 
 MARGIN = 3.0  # of ρ on either side of the cells
@@ -44,7 +45,7 @@ class CrossoverFigure(BaseFigure):
             self.require(column, frames.runs, "runs")
         axes_of = Crossover(strategy=self.strategy, size=self.size, backend=self.backend)
         try:
-            cells = axes_of.cells(records_of(select(self, frames.runs)))
+            cells = axes_of.cells(rows_of(select(self, frames.runs)))
         except StudyError as error:
             raise self.refuse(str(error)) from error
         strategies = list(dict.fromkeys(name for cell in cells for name in cell.strategies))
@@ -59,9 +60,9 @@ class CrossoverFigure(BaseFigure):
             panel.tick_params(labelbottom=True)
         ratios = [cell.unit.ratio for cell in cells]
         across = np.geomspace(min(ratios) / MARGIN, max(ratios) * MARGIN, POINTS)
-        for panel, reference, (size, members) in zip(panels, references(cells), sizes.items(), strict=False):
+        for panel, reference, (size, members) in zip(panels, reference_cells(cells), sizes.items(), strict=False):
             self._panel(panel, reference, members, strategies, across)
-            panel.set_title(join(size, _told(members)))
+            panel.set_title(join(size, _score(members)))
         figure.supxlabel("factorisation / triangular solve", fontsize=9)
         figure.supylabel("cost [triangular solves]", fontsize=9)
         if self.title:
@@ -79,7 +80,7 @@ class CrossoverFigure(BaseFigure):
         slopes, rests = reference.factorizations, reference.rests
         lowest = np.min(slopes[:, None] * across + rests[:, None], axis=0)
         axes.plot(across, lowest, color="0.85", linewidth=5, zorder=1, solid_capstyle="butt")
-        for _, low, _ in envelope(slopes, rests)[1:]:
+        for _, low, _ in lower_envelope(slopes, rests)[1:]:
             if across[0] < low < across[-1]:
                 axes.axvline(low, color="0.6", linewidth=0.5, zorder=0)
         for slope, rest, name in zip(slopes, rests, reference.strategies, strict=True):
@@ -89,10 +90,10 @@ class CrossoverFigure(BaseFigure):
                 if name not in cell.strategies:
                     continue
                 s = cell.strategies.index(name)
-                height = (slope * cell.unit.ratio + rest) / cell.forecast[s]
+                height = (slope * cell.unit.ratio + rest) / cell.predicted[s]
                 mark = curve_style(strategies.index(name), 1, markers=True) | {"linestyle": "none", "zorder": 3}
                 axes.plot([cell.unit.ratio], [height * cell.seconds[s]], **mark)
-                ends = [height * cell.seconds[s], height * cell.most[s]]
+                ends = [height * cell.seconds[s], height * cell.slowest[s]]
                 axes.plot([cell.unit.ratio] * 2, ends, color=mark["color"], linewidth=0.6, zorder=2)
         for cell in members:
             if cell.verdict == OTHER:
@@ -102,7 +103,7 @@ class CrossoverFigure(BaseFigure):
         axes.set_axisbelow(True)
 
 
-def _told(members: list[Cell]) -> str:
-    """Cells whose winner was predicted, ties within the rounds included."""
+def _score(members: list[Cell]) -> str:
+    """In how many cells the winner was predicted, ties within the rounds included."""
     right = sum(cell.verdict != OTHER for cell in members)
     return f"winner predicted in {right} of {len(members)}"

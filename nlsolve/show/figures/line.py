@@ -15,7 +15,8 @@ from pydantic import Field
 
 from nlsolve.contracts.status import Status
 from nlsolve.results.frames import Frames
-from nlsolve.show.figures.base import BaseFigure, Names, listing
+from nlsolve.results.selection import Names
+from nlsolve.show.figures.base import BaseFigure, listing
 from nlsolve.show.figures.cases import ending, labelled, select
 from nlsolve.show.figures.style import ACCENT, DASHES, FAILED, axis_label, bracketed, curve_style, finish, join, symbol
 
@@ -34,6 +35,10 @@ class LineFigure(BaseFigure):
     xlabel: str | None = Field(None, description="absent: the column's symbol and unit")
     ylabel: str | None = Field(None, description="absent: the columns' symbols and units")
 
+    def columns_of_runs(self) -> dict[str, Names]:
+        own = {"x": (self.x,), "y": self.y} if self.source == "runs" else {}
+        return {**super().columns_of_runs(), **own}
+
     def paint(self, figure: Figure, frames: Frames) -> None:
         frame = frames.steps if self.source == "steps" else frames.runs
         for column in (self.x, *self.y):
@@ -48,7 +53,7 @@ class LineFigure(BaseFigure):
             for which, column in enumerate(self.y):
                 points = self._points(rows, column)
                 drawn[column] += len(points)
-                name = join(label, symbol(column) if len(self.y) > 1 else "")
+                name = join(label, symbol(column, self.source) if len(self.y) > 1 else "")
                 place, dashes = (number, DASHES[which % len(DASHES)]) if several else (which, DASHES[0])
                 style = curve_style(place, len(points), self.markers or worded, "none" if worded else dashes)
                 axes.plot(points[self.x], points[column], label=name if len(points) else f"{name} (no values)", **style)
@@ -85,16 +90,16 @@ class LineFigure(BaseFigure):
         return points.sort_values(self.x, kind="stable") if sort else points
 
     def _cross_out(self, axes: Axes, points: pd.DataFrame, column: str) -> None:
-        """A cross on the runs that did not converge."""
+        """Mark the runs that did not converge with a cross."""
         if self.source == "steps" or "status" not in points or "status" in (self.x, column):
             return
-        failed = points[points["status"] != Status.CONVERGED.word]
+        failed = points[[status is not Status.CONVERGED for status in points["status"].map(Status.of)]]
         if len(failed):
             label = "" if any(line.get_label() == FAILED for line in axes.lines) else FAILED
             axes.plot(failed[self.x], failed[column], "x", markersize=6, color=ACCENT, zorder=5, label=label)
 
     def _nothing(self, column: str, frame: pd.DataFrame, groups: Sequence[pd.DataFrame]) -> str:
-        """Why there is nothing to draw, and what could be drawn instead."""
+        """The sentence for a column without numbers to draw, with the columns that have some."""
         kept = "accepted steps" if self.source == "steps" and self.accepted_only else self.source
         rows = pd.concat(list(groups)) if groups else frame.iloc[:0]
         if rows.empty:

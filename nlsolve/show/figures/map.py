@@ -1,4 +1,4 @@
-"""A value of every run in a grid of cells, and what became of the run: right, doubted, wrong, or failed how."""
+"""A value of every run in a grid, with marks on the runs that failed, are in doubt, or are wrong without a doubt."""
 
 from __future__ import annotations
 
@@ -18,21 +18,12 @@ from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 from pydantic import Field
 
 from nlsolve.contracts.status import Status
-from nlsolve.results.frames import Frames
-from nlsolve.results.verdicts import (
-    ACCEPTED,
-    WRONG,
-    Run,
-    doubt,
-    is_error,
-    names_settings,
-    number,
-    outcome,
-    percent,
-    telling,
-)
-from nlsolve.show.figures.base import BaseFigure, Names, listing
-from nlsolve.show.figures.cases import label_of, number_text, records_of, select
+from nlsolve.results.frames import Frames, rows_of
+from nlsolve.results.parameters import differing_parameters, names_settings
+from nlsolve.results.selection import Names
+from nlsolve.results.verdicts import ACCEPTED, WRONG, Run, doubt, is_error, number, outcome, percent, status_of
+from nlsolve.show.figures.base import BaseFigure, listing
+from nlsolve.show.figures.cases import label_of, number_text, select
 from nlsolve.show.figures.style import (
     ACCENT,
     COLUMN,
@@ -54,15 +45,19 @@ NO_NUMBER = "–"
 
 
 @dataclass(frozen=True)
-class Cell:
-    """A run in the grid: its column and row, its number (NaN for none), its outcome, whether it is in doubt."""
+class Tile:
+    """A run in the grid: its column and row, its number (NaN for none), how it ended, and how that is judged."""
 
     column: int
     row: int
     value: float
-    outcome: str
+    status: Status
     doubted: bool
-    failed: bool
+    wrong: bool
+
+    @property
+    def failed(self) -> bool:
+        return self.status is not Status.CONVERGED
 
 
 class MapFigure(BaseFigure):
@@ -86,16 +81,16 @@ class MapFigure(BaseFigure):
         runs = select(self, frames.runs)
         for column in (*self.x, *self.y, self.value):
             self.require(column, runs, "runs")
-        records = records_of(runs)
-        across, down = ([_category(names, run) for run in records] for names in (self.x, self.y))
+        members = rows_of(runs)
+        across, down = ([_category(names, run) for run in members] for names in (self.x, self.y))
         columns, rows = list(dict.fromkeys(across)), list(dict.fromkeys(down))
         self._refuse_twins(runs, list(zip(across, down, strict=True)))
         if len(columns) * len(rows) > MOST_CELLS:
             raise self.refuse(f"{len(rows)} by {len(columns)} cells are too many; choose at most {MOST_CELLS}")
-        cells = [
-            self._cell(run, columns.index(x), rows.index(y)) for run, x, y in zip(records, across, down, strict=True)
+        tiles = [
+            self._tile(run, columns.index(x), rows.index(y)) for run, x, y in zip(members, across, down, strict=True)
         ]
-        norm = self._norm(cells)
+        norm = self._norm(tiles)
         beside, above = (LETTER * max(map(letters, labels)) for labels in (rows, columns))
         width = float(
             np.clip(beside + max(CELL, above) * len(columns) + MARGIN, COLUMN / MILLIMETRE, PAGE / MILLIMETRE)
@@ -106,14 +101,14 @@ class MapFigure(BaseFigure):
         axes = figure.add_subplot()
         self._grid(axes, columns, rows, leaning=above > room)
         size = float(np.clip(room / LETTERS_IN_CELL / 0.16, 4.5, 7.5))  # a letter is 0.16 mm wide a point of type
-        for cell in cells:
-            self._paint_cell(axes, cell, norm, size)
-        self._empty_cells(axes, {(cell.column, cell.row) for cell in cells}, len(columns), len(rows), size)
+        for tile in tiles:
+            self._paint_tile(axes, tile, norm, size)
+        self._empty_places(axes, {(tile.column, tile.row) for tile in tiles}, len(columns), len(rows), size)
         if norm is not None:
             self._bar(figure, axes, norm, len(rows))
         if self.title:
             axes.set_title(self.title)
-        self._legend(figure, cells)
+        self._legend(figure, tiles)
 
     def _refuse_twins(self, runs: pd.DataFrame, places: Sequence[tuple[str, str]]) -> None:
         for place in dict.fromkeys(places):
@@ -121,18 +116,18 @@ class MapFigure(BaseFigure):
             if len(here) > 1:
                 raise self.refuse(
                     f"{len(here)} runs land in the cell {place[0]!r}, {place[1]!r}; "
-                    f"they differ in {listing(telling(runs.iloc[here]))}: add one to `x` or `y`, or choose with `where`"
+                    f"they differ in {listing(differing_parameters(runs.iloc[here]))}: "
+                    "add one to `x` or `y`, or choose with `where`"
                 )
 
-    def _cell(self, run: Run, column: int, row: int) -> Cell:
+    def _tile(self, run: Run, column: int, row: int) -> Tile:
         error = self.value if is_error(self.value) else "velocity_error"
-        failed = run["status"] != Status.CONVERGED.word
-        judged = outcome(run, self.accepted, error)
-        return Cell(column, row, number(run[self.value]), judged, bool(doubt(run)), failed)
+        wrong = outcome(run, self.accepted, error) == WRONG
+        return Tile(column, row, number(run[self.value]), status_of(run), bool(doubt(run)), wrong)
 
-    def _norm(self, cells: Sequence[Cell]) -> LogNorm | None:
-        """Colours from the least to the largest number of converged runs, of errors to 100 %; None without any."""
-        converged = [cell.value for cell in cells if not cell.failed]
+    def _norm(self, tiles: Sequence[Tile]) -> LogNorm | None:
+        """The colour scale: least to largest number of the converged runs, errors up to 100 %; None without numbers."""
+        converged = [tile.value for tile in tiles if not tile.failed]
         numbers = [value for value in converged if np.isfinite(value) and value > 0]
         if converged and not numbers:
             raise self.refuse(f"value = {self.value!r} holds no positive number in the {len(converged)} converged runs")
@@ -164,21 +159,21 @@ class MapFigure(BaseFigure):
             if self.separate and families[row] != families[row - 1]:
                 axes.axhline(row - 0.5, color="0.25", linewidth=0.6, zorder=4)
 
-    def _paint_cell(self, axes: Axes, cell: Cell, norm: LogNorm | None, size: float) -> None:
-        left, top = cell.column - 0.5, cell.row - 0.5
+    def _paint_tile(self, axes: Axes, tile: Tile, norm: LogNorm | None, size: float) -> None:
+        left, top = tile.column - 0.5, tile.row - 0.5
         ink = "0.1"
-        if cell.failed:
+        if tile.failed:
             axes.add_patch(Rectangle((left, top), 1, 1, **FAILED_FACE))
-        elif norm is not None and np.isfinite(cell.value):
-            red, green, blue, _ = ERROR_MAP(norm(max(cell.value, norm.vmin or 0)))
+        elif norm is not None and np.isfinite(tile.value):
+            red, green, blue, _ = ERROR_MAP(norm(max(tile.value, norm.vmin or 0)))
             ink = "0.1" if 0.3 * red + 0.59 * green + 0.11 * blue > 0.5 else "white"
             axes.add_patch(Rectangle((left, top), 1, 1, facecolor=(red, green, blue), edgecolor="none"))
         axes.add_patch(Rectangle((left, top), 1, 1, facecolor="none", edgecolor="white", linewidth=0.8, zorder=2))
-        words = code(cell.outcome) if cell.failed else short(cell.value, self.value)
-        box: Any = {"facecolor": "0.93", "edgecolor": "none", "pad": 0.6} if cell.failed else None
+        words = code(tile.status) if tile.failed else short(tile.value, self.value)
+        box: Any = {"facecolor": "0.93", "edgecolor": "none", "pad": 0.6} if tile.failed else None
         axes.text(
-            cell.column,
-            cell.row,
+            tile.column,
+            tile.row,
             words,
             ha="center",
             va="center_baseline",
@@ -187,17 +182,17 @@ class MapFigure(BaseFigure):
             bbox=box,
             zorder=5,
         )
-        if cell.doubted:
+        if tile.doubted:
             corner = [(left + 0.86, top + 0.04), (left + 0.985, top + 0.04), (left + 0.985, top + 0.5)]
             axes.add_patch(Polygon(corner, facecolor=DOUBT, edgecolor="white", linewidth=0.4, zorder=3))
-        if cell.outcome == WRONG:
+        if tile.wrong:
             axes.add_patch(
                 Rectangle(
                     (left + 0.02, top + 0.07), 0.96, 0.86, facecolor="none", edgecolor=ACCENT, linewidth=1.5, zorder=6
                 )
             )
 
-    def _empty_cells(self, axes: Axes, taken: set[tuple[int, int]], columns: int, rows: int, size: float) -> None:
+    def _empty_places(self, axes: Axes, taken: set[tuple[int, int]], columns: int, rows: int, size: float) -> None:
         for column in range(columns):
             for row in range(rows):
                 if (column, row) not in taken:
@@ -219,34 +214,34 @@ class MapFigure(BaseFigure):
         bar.ax.xaxis.set_major_formatter(FuncFormatter(lambda value, _: short(value, self.value)))
         bar.outline.set_linewidth(0.5)
 
-    def _legend(self, figure: Figure, cells: Sequence[Cell]) -> None:
-        """What the marks mean: only those that are there."""
+    def _legend(self, figure: Figure, tiles: Sequence[Tile]) -> None:
+        """A legend of the marks that occur."""
         handles: list[Any] = []
-        wrong = [cell for cell in cells if cell.outcome == WRONG]
+        wrong = [tile for tile in tiles if tile.wrong]
         if wrong:
             limit = short(self.accepted, "velocity_error")
             words = f"false success: error above {limit} ({len(wrong)})"
             handles.append(Patch(facecolor="white", edgecolor=ACCENT, linewidth=1.5, label=words))
-        doubted = sum(cell.doubted for cell in cells)
+        doubted = sum(tile.doubted for tile in tiles)
         if doubted:
             corner: Any = {"linestyle": "none", "marker": (3, 0, -45), "markersize": 7, "markeredgewidth": 0}
             handles.append(Line2D([], [], color=DOUBT, label=f"{IN_DOUBT} ({doubted})", **corner))
-        failed = [cell.outcome for cell in cells if cell.failed]
+        failed = [tile.status for tile in tiles if tile.failed]
         for status in dict.fromkeys(failed):
-            words = f"{code(status)}: {status} ({failed.count(status)})"
+            words = f"{code(status)}: {status.word} ({failed.count(status)})"
             handles.append(Patch(**FAILED_FACE, label=words))
         if handles:
             legend_outside(figure, handles, [handle.get_label() for handle in handles], "lower")
 
 
-def code(status: str) -> str:
-    """ "budget spent" -> "BS", "diverged" -> "DIV"."""
-    words = status.split()
-    return ("".join(word[0] for word in words) if len(words) > 1 else status[:3]).upper()
+def code(status: Status) -> str:
+    """A few letters for a status: "BS" for "budget spent", "DIV" for "diverged"."""
+    words = status.word.split()
+    return ("".join(word[0] for word in words) if len(words) > 1 else status.word[:3]).upper()
 
 
 def short(value: float, column: str) -> str:
-    """Two digits: errors in percent from 0.01 % to 1000 %; 3e-5 and 2e4 for what is very small or large."""
+    """A number in two digits: errors from 0.01 % to 1000 % in percent, very small and large ones as 3e-5 and 2e4."""
     if not np.isfinite(value):
         return NO_NUMBER
     if is_error(column) and 1e-4 <= value < 10:
@@ -258,6 +253,6 @@ def short(value: float, column: str) -> str:
 
 
 def _category(names: Names, run: Run) -> str:
-    """What a run's row or column is called: the bare value of one column, words for several."""
+    """The label of a run's row or column: the bare value of one column, words for several."""
     values = {name: run[name] for name in names if not pd.isna(run[name])}
     return number_text(*values.values()) if len(names) == len(values) == 1 else label_of(values) or NO_NUMBER

@@ -1,4 +1,4 @@
-"""Which part of the problems each strategy solves, within what cost; what it does not solve stays in the count."""
+"""The share of the problems that each strategy solves, over the cost it is allowed: performance and data profiles."""
 
 from __future__ import annotations
 
@@ -15,12 +15,14 @@ from matplotlib.ticker import LogFormatter
 from pydantic import BeforeValidator, Field
 
 from nlsolve.results.columns import RUNS
-from nlsolve.results.frames import Frames
+from nlsolve.results.frames import Frames, rows_of
+from nlsolve.results.parameters import differing_parameters, settled
 from nlsolve.results.profiles import band, ratios, within
-from nlsolve.results.verdicts import ACCEPTED, Run, number, settled, solved, telling
+from nlsolve.results.selection import Names
+from nlsolve.results.verdicts import ACCEPTED, Run, number, solved
 from nlsolve.series import Array
-from nlsolve.show.figures.base import BaseFigure, Names, listing
-from nlsolve.show.figures.cases import label_of, labelled, records_of, select
+from nlsolve.show.figures.base import BaseFigure, listing
+from nlsolve.show.figures.cases import label_of, labelled, select
 from nlsolve.show.figures.style import PAGE, axis_label, curve_style, finish, join, symbol
 
 Weights = Annotated[
@@ -43,7 +45,7 @@ class SolvedFigure(BaseFigure):
     """A rising stair a strategy (`group`) over a logarithmic cost; it ends at the share of problems it solves at all.
 
     A run is a problem solved when it converged, with a verified residual and an error that is accepted or unknown
-    (`outcomes.solved`); any other costs ∞. Bands hold the part `interval` of the shares when the problems are drawn
+    (`verdicts.solved`); any other costs ∞. Bands hold the part `interval` of the shares when the problems are drawn
     anew (Efron 1979).
     """
 
@@ -70,7 +72,7 @@ class SolvedFigure(BaseFigure):
 
     @abstractmethod
     def abscissa(self, costs: Array) -> Array:
-        """What a share is taken of, shape (S, P): the costs themselves or something made of them."""
+        """The costs (S, P) in the unit of the horizontal axis."""
 
     @abstractmethod
     def words(self) -> str:
@@ -99,9 +101,9 @@ class SolvedFigure(BaseFigure):
         axes.set_title(join(self.title, nobody))
 
     def costs(self, runs: pd.DataFrame) -> Costs:
-        """The cost of every strategy for every problem; refused unless each has run each once."""
+        """The cost of every strategy for every problem. Raises FigureError unless each has run each problem once."""
         groups = labelled(self, runs, one_case=False)
-        problem = self.problem or _differing(runs, self.group)
+        problem = self.problem or _problem_columns(runs, self.group)
         tables = [self._by_problem(label, members, problem) for label, members in groups]
         everyone = list(dict.fromkeys(key for table in tables for key in table))
         for (label, _), table in zip(groups, tables, strict=True):
@@ -117,19 +119,20 @@ class SolvedFigure(BaseFigure):
 
     def _by_problem(self, label: str, members: pd.DataFrame, problem: Names) -> Mapping[tuple[str, ...], Run]:
         table: dict[tuple[str, ...], Run] = {}
-        for run in records_of(members):
+        for run in rows_of(members):
             key = tuple(str(run[name]) for name in problem)
             if key in table:
                 several = members[[tuple(map(str, row)) == key for row in members[list(problem)].to_numpy(object)]]
                 raise self.refuse(
-                    f"{len(several)} runs of {label} are of one problem; they differ in {listing(telling(several))}: "
+                    f"{len(several)} runs of {label} are of one problem; "
+                    f"they differ in {listing(differing_parameters(several))}: "
                     "add one to `problem` or `group`, or choose with `where`"
                 )
             table[key] = run
         return table
 
     def _cost(self, run: Run) -> float:
-        """Σ weight · column; ∞ for what is not solved."""
+        """Σ weight · column; ∞ for a run that is not solved."""
         if not solved(run, self.accepted, self.error):
             return np.inf
         total = sum(weight * number(run[column]) for column, weight in self.cost.items())
@@ -155,8 +158,9 @@ class SolvedFigure(BaseFigure):
                 axes.fill_between(places, low, high, **fill)
 
     def work(self) -> str:
-        """ "time inside the method", "triangular solves + 20 factorisations"."""
-        return " + ".join(f"{'' if w == 1 else f'{w:g} '}{symbol(column)}" for column, w in self.cost.items())
+        """The cost in words: "time inside the method", "triangular solves + 20 factorisations"."""
+        weights = {column: "" if weight == 1 else f"{weight:g} " for column, weight in self.cost.items()}
+        return " + ".join(weight + symbol(column, "runs") for column, weight in weights.items())
 
 
 class PerformanceFigure(SolvedFigure):
@@ -186,7 +190,7 @@ class DataFigure(SolvedFigure):
         return axis_label(list(self.cost), "runs") if len(self.cost) == 1 else self.work()
 
 
-def _differing(runs: pd.DataFrame, group: Names) -> Names:
-    """Parameters that are not the same in all runs of a strategy."""
+def _problem_columns(runs: pd.DataFrame, group: Names) -> Names:
+    """Parameters that differ between the runs of one strategy: they tell its problems apart."""
     words = {str(name): [str(value) for value in runs[name]] for name in runs if name not in RUNS or name in group}
     return tuple(name for name in words if name not in group and not settled(words, name, group))

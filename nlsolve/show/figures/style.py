@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 from matplotlib import colormaps
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from nlsolve.results.columns import FIELDS, RUNS, STEPS
+from nlsolve.results.columns import FRAMES
 
 MILLIMETRE = 1 / 25.4  # [inch]
 COLUMN, PAGE = 90 * MILLIMETRE, 180 * MILLIMETRE  # widths of one and of two columns of a journal
@@ -19,7 +19,6 @@ COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#0
 DASHES = ("-", "--", ":", "-.")
 MARKERS = ("o", "s", "^", "D", "v", "<", ">")
 UPPER, LOWER, ACCENT = COLOURS[0], COLOURS[4], "#C00000"
-SIGNED_MAP, POSITIVE_MAP = "RdBu_r", "viridis"
 ERROR_MAP = colormaps["YlGnBu"]
 FAILED = "not converged"  # last in every legend
 IN_DOUBT = "in doubt by its audits"
@@ -55,62 +54,31 @@ STYLE: Any = {
     "savefig.facecolor": "white",
 }
 
-SYMBOLS: Mapping[str, str] = {
-    "time": "$t$",
-    "range": r"$a_{\max}$",
-    "residual_norm": "relative residual",
-    "difference": "relative difference",
-    "length": "step length",
-    "seconds": "time inside the method",
-    "probe_x": "$x$",
-    "probe_y": "$y$",
-    "probe_u": "$u$",
-    "probe_v": "$v$",
-    "x": "$x$",
-    "y": "$y$",
-    "u": "$u$",
-    "v": "$v$",
-    "exx": r"$\dot{\varepsilon}_{xx}$",
-    "eyy": r"$\dot{\varepsilon}_{yy}$",
-    "exy": r"$\dot{\varepsilon}_{xy}$",
-    "rate": r"$\bar{\varepsilon}$",
-    "factorizations": "factorisations",
-    "validity_time": "time served by the first tangent",
-    "velocity_error": "relative error of the velocity",
-    "torque_error": "relative error of the torque",
-    "fill": "entries of the factors",
-    "factor_solve_ratio": "factorisation / triangular solve",
-}
+
+def symbol(column: str, frame: str) -> str:
+    """What an axis calls a column of `runs`, `steps` or `fields`: its symbol, or its own name in words."""
+    known = FRAMES[frame].get(column)
+    in_words = column.removesuffix(".kind").rpartition(".")[2].replace("_", " ")
+    return known.symbol or in_words if known else in_words
 
 
-def symbol(column: str) -> str:
-    """A column's symbol, or its own name in words."""
-    return SYMBOLS.get(column, column.removesuffix(".kind").rpartition(".")[2].replace("_", " "))
-
-
-def unit(column: str, source: str) -> str:
-    """The unit a column of `runs`, `steps` or `fields` is described with, "[mm/s]"; empty when there is none."""
-    descriptions = {"runs": RUNS, "steps": STEPS, "fields": FIELDS}[source]
-    found = re.search(r"\[[^\]]+\](?!.*\[)", descriptions.get(column, ""))
-    return found[0] if found else ""
-
-
-def axis_label(columns: Sequence[str], source: str) -> str:
+def axis_label(columns: Sequence[str], frame: str) -> str:
     """Symbols and unit of columns of `runs`, `steps` or `fields`, e.g. "$u$, $v$ [mm/s]"."""
-    units = [unit(column, source) for column in columns]
-    names = [symbol(column) for column in columns]
+    units = [FRAMES[frame][column].unit if column in FRAMES[frame] else "" for column in columns]
+    brackets = [f" [{unit}]" if unit else "" for unit in units]
+    names = [symbol(column, frame) for column in columns]
     if len(set(units)) == 1:
-        return f"{', '.join(names)} {units[0]}".strip()
-    return ", ".join(f"{name} {of_it}".strip() for name, of_it in zip(names, units, strict=True))
+        return f"{', '.join(names)}{brackets[0]}"
+    return ", ".join(f"{name}{bracket}" for name, bracket in zip(names, brackets, strict=True))
 
 
 def join(*parts: str | None) -> str:
-    """The parts that say something, with commas between."""
+    """The parts that are not empty, with commas between."""
     return ", ".join(filter(None, parts))
 
 
 def bracketed(label: str, note: str) -> str:
-    """A label and a note on it, or the one of them that says something."""
+    """A label with a note in brackets, or the one of them that is not empty."""
     return f"{label} ({note})" if label and note else label or note
 
 
@@ -128,7 +96,7 @@ def curve_style(number: int, points: int, markers: bool, dashes: str = "-") -> d
 
 
 def finish(figure: Figure, axes: Axes, title: str | None) -> None:
-    """Grid and title, and the legend above the axes, where it covers nothing."""
+    """Add grid, title, and a legend above the axes."""
     axes.grid(True, color="0.92", linewidth=0.5)
     axes.set_axisbelow(True)
     if title:
@@ -140,7 +108,7 @@ def finish(figure: Figure, axes: Axes, title: str | None) -> None:
 
 
 def legend_outside(figure: Figure, handles: Sequence[Any], labels: Sequence[str], edge: str = "upper") -> None:
-    """A legend at the edge of the paper, in as many columns as fit; the paper grows by the rows."""
+    """Add a legend at the edge of the paper, in as many columns as fit; the paper grows by its rows."""
     longest = max(map(letters, labels))
     width = figure.get_figwidth() / MILLIMETRE
     columns = max(1, min(len(labels), int((width - 4) // (1.35 * longest + 10))))
@@ -152,5 +120,5 @@ def legend_outside(figure: Figure, handles: Sequence[Any], labels: Sequence[str]
 
 
 def letters(label: str) -> int:
-    """Letters of a label on paper, without those of its mathematics."""
+    """How many letters of a label are printed, without the commands of its mathematics."""
     return len(re.sub(r"\\[a-z]+|[${}_^]", "", label))

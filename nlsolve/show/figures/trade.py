@@ -1,4 +1,4 @@
-"""What accuracy costs: error over cost of every run, the front nobody beats, and the cheapest run for each target."""
+"""Error over cost of every run, the front of runs that none beats in both, and the cheapest run for each target."""
 
 from __future__ import annotations
 
@@ -10,15 +10,18 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from numpy.typing import NDArray
 from pydantic import Field
 
 from nlsolve.contracts.status import Status
-from nlsolve.results.frames import Frames
-from nlsolve.results.verdicts import Run, cheapest, doubt, is_error, number, percent, telling
-from nlsolve.show.figures.base import BaseFigure, Names
-from nlsolve.show.figures.cases import label_of, labelled, records_of, select
-from nlsolve.show.figures.style import ACCENT, COLOURS, IN_DOUBT, MARKERS, PAGE, axis_label, join, legend_outside, unit
+from nlsolve.results.columns import RUNS
+from nlsolve.results.frames import Frames, rows_of
+from nlsolve.results.parameters import differing_parameters
+from nlsolve.results.selection import Names
+from nlsolve.results.verdicts import Run, cheapest, doubt, is_error, number, percent
+from nlsolve.series import Array
+from nlsolve.show.figures.base import BaseFigure
+from nlsolve.show.figures.cases import label_of, labelled, select
+from nlsolve.show.figures.style import ACCENT, COLOURS, IN_DOUBT, MARKERS, PAGE, axis_label, join, legend_outside
 
 FRONT = "no run is cheaper and better"
 
@@ -43,7 +46,7 @@ class TradeFigure(BaseFigure):
         for column in (self.x, self.y):
             self.require(column, frames.runs, "runs")
         chosen = select(self, frames.runs)
-        converged = chosen[chosen["status"] == Status.CONVERGED.word]
+        converged = chosen[[status is Status.CONVERGED for status in chosen["status"].map(Status.of)]]
         cost, error = (converged[name].map(number).to_numpy(float) for name in (self.x, self.y))
         runs = converged[(cost > 0) & (error > 0) & np.isfinite(cost + error)]
         if runs.empty:
@@ -67,7 +70,7 @@ class TradeFigure(BaseFigure):
             legend_outside(figure, winners, [str(handle.get_label()) for handle in winners], "lower")
 
     def _points(self, axes: Axes, runs: pd.DataFrame) -> list[Any]:
-        """Marks by group, and their entries of the legend."""
+        """Draw the marks by group; returns their entries of the legend."""
         handles: list[Any] = []
         doubted = runs.apply(lambda run: bool(doubt(run)), axis=1).to_numpy(bool)
         position = {case: place for place, case in enumerate(runs.index)}
@@ -95,12 +98,11 @@ class TradeFigure(BaseFigure):
         return handles
 
     def _winners(self, axes: Axes, runs: pd.DataFrame) -> list[Any]:
-        """Rings, target lines, and the names of the winners."""
-        records = records_of(runs)
-        words = telling(runs)
+        """Draw a ring and a line for each target; returns entries of the legend with the names of the cheapest runs."""
+        candidates, words = rows_of(runs), differing_parameters(runs)
         handles = []
         for place, target in enumerate(self.targets):
-            best = cheapest(records, self.x, self.y, target)
+            best = cheapest(candidates, self.x, self.y, target)
             ring: Any = {"linestyle": "none", "marker": "o", "markerfacecolor": "none", "markeredgecolor": ACCENT}
             ring |= {"markersize": 9 + 3 * place, "markeredgewidth": 1.1, "zorder": 4}
             goal = percent(target) if is_error(self.y) else f"{target:g}"
@@ -113,12 +115,13 @@ class TradeFigure(BaseFigure):
         return handles
 
     def _name(self, run: Run, words: Sequence[str]) -> str:
-        """ "mls, graded-rings, first 0.05, 0.42 s"."""
-        price = f"{float(run[self.x]):.2g} {unit(self.x, 'runs').strip('[]')}".strip()
+        """A run in words: "mls, graded-rings, first 0.05, 0.42 s"."""
+        unit = RUNS[self.x].unit if self.x in RUNS else ""
+        price = f"{float(run[self.x]):.2g} {unit}".strip()
         return join(label_of({name: run[name] for name in words}), price, "in doubt" if doubt(run) else "")
 
     def _left_out(self, chosen: pd.DataFrame, converged: pd.DataFrame, runs: pd.DataFrame) -> list[str]:
-        """How many runs are not drawn, and why."""
+        """Sentences on the runs that are not drawn."""
         failed, without = len(chosen) - len(converged), len(converged) - len(runs)
         return [
             f"{failed} of {len(chosen)} runs did not converge" if failed else "",
@@ -126,8 +129,8 @@ class TradeFigure(BaseFigure):
         ]
 
 
-def _front(cost: NDArray[np.float64], error: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """The runs that none beats in both: cost ascending, error descending; then on to the dearest run."""
+def _front(cost: Array, error: Array) -> tuple[Array, Array]:
+    """Cost and error of the runs that none beats in both, by rising cost; last, the same error at the largest cost."""
     order = np.lexsort((error, cost))
     cost, error = cost[order], error[order]
     best = np.minimum.accumulate(error)

@@ -1,7 +1,7 @@
-"""Tables a study declares: one cell a run, rows and columns by parameter, the paper's values beside them.
+"""Tables a study declares: a cell a run, rows and columns by parameter, the values of a paper beside them.
 
-Or, of many runs: the cheapest within an error (`cheapest`), how many there are (`count`), the share `solved`, who wins
-(`crossover`).
+Or a cell for many runs: the cheapest within an error (`cheapest`), their number (`count`), the share `solved`, or which
+strategy is cheapest where (`crossover`).
 """
 
 from __future__ import annotations

@@ -1,28 +1,26 @@
-"""What a study declares of a table: which runs, laid out by which of their columns, showing what."""
+"""The declaration of a table: which runs, by which columns they are laid out, and which are shown."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Annotated, Any, ClassVar
+from collections.abc import Sequence
+from typing import Any, ClassVar
 
 import numpy as np
-from pydantic import BeforeValidator, Field, field_validator, model_validator
+from pydantic import Field, field_validator, model_validator
 
 from nlsolve.contracts.component import Component
 from nlsolve.results.aggregates import COUNT, NO_RUN, WITHIN, Cheapest, counted, success
 from nlsolve.results.costs.crossover import Crossover
-from nlsolve.results.published_values import PaperValues
-from nlsolve.results.verdicts import ACCEPTED, SOLVED, SPEEDUP
+from nlsolve.results.published_values import PublishedValues
+from nlsolve.results.selection import Names, Scalar, Where
+from nlsolve.results.verdicts import ACCEPTED, SOLVED, SPEEDUP, Run
 
 SHARE = ".2f"
 """Format of shares where a table gives none."""
 
-Scalar = bool | int | float | str
-Names = Annotated[tuple[str, ...], BeforeValidator(lambda value: (value,) if isinstance(value, str) else value)]
-
 
 class TableSpec(Component):
-    """A declared table."""
+    """A table as a study declares it."""
 
     noun: ClassVar[str] = "table"
 
@@ -37,7 +35,7 @@ class TableSpec(Component):
         "by `against` over those of the run; `solved`: the share of a cell's runs that are solved, with its interval; "
         "with count: runs, solved",
     )
-    where: dict[str, Scalar | list[Scalar]] = Field(
+    where: Where = Field(
         default_factory=dict, description="column of `runs` -> value, or list of values, a run must have"
     )
     against: dict[str, Scalar] = Field(
@@ -59,7 +57,7 @@ class TableSpec(Component):
     count: bool = Field(
         False, description="cells count runs, such as rows = variant, columns = outcome; value = solved: those solved"
     )
-    paper: PaperValues | None = Field(None, description="a paper's values to compare with")
+    paper: PublishedValues | None = Field(None, description="a paper's values to compare with")
 
     @field_validator("format")
     @classmethod
@@ -119,8 +117,13 @@ class TableSpec(Component):
             return self.crossover.labels
         return self.rows if self.cheapest is None else (WITHIN, *self.rows)
 
-    def condensed(self, runs: Sequence[Mapping[str, Any]]) -> Sequence[Mapping[str, Any]]:
-        """A record a cell of the runs that fit: themselves, unless they are to be counted or to compete."""
+    @property
+    def aggregates(self) -> bool:
+        """Whether a cell says something of many runs, and not of one."""
+        return self.count or self.success or self.cheapest is not None or self.crossover is not None
+
+    def aggregated(self, runs: Sequence[Run]) -> Sequence[Run]:
+        """What the cells are filled from: the chosen runs themselves, or a row for many of them."""
         layout = (*self.rows, *self.columns)
         if self.cheapest is not None:
             return self.cheapest.of(runs, layout)
@@ -131,7 +134,7 @@ class TableSpec(Component):
         return counted(runs, layout) if self.count else runs
 
     def text(self, value: Any) -> str:
-        """A cell for people."""
+        """What is printed in a cell that holds this value."""
         if isinstance(value, str):
             return value
         if isinstance(value, (bool, np.bool_)):

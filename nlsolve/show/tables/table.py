@@ -9,14 +9,15 @@ import pandas as pd
 from rich.markup import escape
 from rich.table import Table as RichTable
 
+from nlsolve.results.frames import json_rows
 from nlsolve.show.tables.spec import TableSpec
 
 
 @dataclass(frozen=True)
 class Table:
-    """A table of results.
+    """A declared table, filled.
 
-    cells : a number, a word for a run that failed, or NaN where there is no run.
+    cells : numbers and words of runs, the status of a run that failed, NaN where there is no run.
     comparison : "measured (paper) verdict" in the same layout; None without paper values.
     """
 
@@ -26,11 +27,11 @@ class Table:
 
     @property
     def words(self) -> pd.DataFrame:
-        """The cells as they are printed."""
+        """The cells as printed."""
         return self.cells.map(self.spec.text)
 
     def files(self) -> dict[str, str]:
-        """Text of the files a table is written to, by ending."""
+        """The texts that are written to files, by the ending of the file's name."""
         texts = {".csv": self.csv(), ".md": self.markdown(), ".tex": self.latex()}
         if self.comparison is not None:
             texts["-paper.csv"] = _flat(self.comparison).to_csv(index=False)
@@ -41,31 +42,27 @@ class Table:
         return _flat(self.cells).to_csv(index=False)
 
     def long(self) -> list[dict[str, Any]]:
-        """For JSON: a record a row, null where there is no run."""
-        flat = _flat(self.cells)
-        return [
-            {name: None if pd.isna(value) else value for name, value in zip(flat.columns, row, strict=True)}
-            for row in flat.itertuples(index=False)
-        ]
+        """For JSON: an object a row, null where there is no run."""
+        return json_rows(_flat(self.cells))
 
     def frames(self) -> dict[str, pd.DataFrame]:
-        """The table for people, under its caption, then its comparison, under the paper's name."""
+        """Title -> frame of words: the table under its caption, then its comparison under the paper's name."""
         frames = {self.spec.caption or self.spec.name: self.words}
         if self.comparison is not None and self.spec.paper is not None:
             frames[f"{self.spec.name}: measured ({self.spec.paper.source}) verdict"] = self.comparison
         return {title: frame.rename(index=_word, columns=_word) for title, frame in frames.items()}
 
     def rich(self) -> list[RichTable]:
-        """For a terminal."""
+        """What `frames` holds, for a terminal."""
         return [_rich(title, frame) for title, frame in self.frames().items()]
 
     def markdown(self) -> str:
-        """GitHub's tables: the table, then its comparison."""
+        """What `frames` holds, as GitHub writes tables."""
         parts = [_flat(frame).to_markdown(index=False, disable_numparse=True) for frame in self.frames().values()]
         return "\n\n".join(parts) + "\n"
 
     def latex(self) -> str:
-        """A booktabs tabular, captioned, of the comparison if there is one and of the cells if not."""
+        """A captioned booktabs table of the comparison, or of the cells where there is none."""
         frame = self.words if self.comparison is None else self.comparison
         frame = frame.rename(index=_word, columns=_word).rename_axis(index=_escaped, columns=_escaped)
         styler = frame.style.format(escape="latex").format_index(escape="latex", axis=0)
@@ -74,7 +71,7 @@ class Table:
 
 
 def _flat(frame: pd.DataFrame) -> pd.DataFrame:
-    """Row labels as columns, column labels as one text, named by what they are."""
+    """The frame with its row labels as columns, and with one text a column label."""
     names = [str(name) for name in frame.columns.names if name]
     flat = frame.reset_index()
     labels = [
@@ -103,6 +100,6 @@ def _rich(title: str, frame: pd.DataFrame) -> RichTable:
 
 
 def _escaped(text: Any) -> str:
-    """Text for LaTeX."""
+    """Text whose special letters LaTeX prints."""
     special = {"&": r"\&", "%": r"\%", "_": r"\_", "#": r"\#", "$": r"\$"}
     return "".join(special.get(letter, letter) for letter in str(text or ""))

@@ -271,7 +271,7 @@ def test_a_range_under_one_renews_the_tangent_under_the_papers_rule_and_not_othe
     assert ledger.counts["factorization"] > 1
     kept, _ = run(flow, AsymptoticNumericalMethod(), Never(), near(flow, 0.31))
     assert kept.status is Status.CONVERGED
-    assert {row["branch"] for row in kept.steps[1:]} == {1}
+    assert {row["tangents"] for row in kept.steps[1:]} == {1}
 
 
 @pytest.mark.parametrize("index", [0.5, 0.3])

@@ -1,4 +1,4 @@
-"""Where the material went: the nodes, or the markers that left them, at a time, by the half they started in."""
+"""Nodes, or the markers of the material, at one time, coloured by the half of the disc they started in."""
 
 from __future__ import annotations
 
@@ -13,8 +13,9 @@ from pydantic import Field
 from scipy.spatial import cKDTree
 
 from nlsolve.results.frames import Frames
+from nlsolve.series import Array
 from nlsolve.show.figures.nodes.panels import PanelsFigure, panels_of, snapshots_of
-from nlsolve.show.figures.nodes.sections import Array, boundaries
+from nlsolve.show.figures.nodes.sections import boundaries
 from nlsolve.show.figures.style import ACCENT, COLOURS
 
 HALVES = (("$y_0 > 0$", COLOURS[0]), (r"$y_0 \leq 0$", COLOURS[4]))

@@ -11,8 +11,9 @@ from matplotlib.ticker import FixedLocator, FuncFormatter, MaxNLocator
 from pydantic import Field
 
 from nlsolve.results.frames import Frames
+from nlsolve.series import Array
 from nlsolve.show.figures.nodes.panels import PanelsFigure, panels_of, snapshots_of
-from nlsolve.show.figures.nodes.sections import Array, outline, triangulate
+from nlsolve.show.figures.nodes.sections import outline, triangulate
 from nlsolve.show.figures.style import axis_label
 
 SIGNED_MAP, POSITIVE_MAP = "RdBu_r", "viridis"

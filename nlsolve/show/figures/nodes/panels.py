@@ -21,13 +21,13 @@ Window = tuple[float, float, float, float]
 
 
 class NodesFigure(BaseFigure):
-    """Figures of the nodes at one time."""
+    """Base of figures that show the nodes at one time."""
 
     time: float | None = Field(None, ge=0, description="the nearest recorded time is drawn [s]; absent: the last")
 
 
 class PanelsFigure(NodesFigure):
-    """Figures of places: a panel a case."""
+    """Base of figures with a panel a case, in which places of the plane are shown."""
 
     window: Window | None = Field(None, description="xmin, xmax, ymin, ymax shown [mm]")
 
@@ -49,7 +49,7 @@ Panel = tuple[Axes, Snapshot]
 
 
 def snapshots_of(spec: NodesFigure, frames: Frames, columns: Sequence[str]) -> list[Snapshot]:
-    """A snapshot a chosen case; at least one of them has numbers in every one of the columns."""
+    """A snapshot of every chosen case. Raises FigureError when none of them has numbers in all of the columns."""
     fields = frames.fields
     for column in columns:
         spec.require(column, fields, "fields")
@@ -78,13 +78,13 @@ def snapshots_of(spec: NodesFigure, frames: Frames, columns: Sequence[str]) -> l
 
 
 def _half_increment(run: pd.Series, time: float) -> float:
-    """How far from the time asked for a record may be without a word; rounding only when increments are unknown."""
+    """Half the case's increment: a record farther from the time asked for is labelled with its own time."""
     increment = pd.to_numeric(run.get("time.increment", np.nan), errors="coerce")
     return 0.5 * (1 + 1e-6) * float(increment) if np.isfinite(increment) else 1e-9 * time
 
 
 def panels_of(figure: Figure, spec: PanelsFigure, snapshots: Sequence[Snapshot], bar: bool) -> list[Panel]:
-    """An equal-aspect panel a case, on paper of the right shape; returns those that have nodes."""
+    """Panels of equal aspect, one a case, on paper of a fitting height; returns those whose case has nodes."""
     if len(snapshots) > MOST_PANELS:
         raise spec.refuse(f"{len(snapshots)} cases are too many panels; choose at most {MOST_PANELS} with `where`")
     left, right, bottom, top = _shown(spec, snapshots)

@@ -9,14 +9,16 @@ import pandas as pd
 from matplotlib.figure import Figure
 from pydantic import Field
 
+from nlsolve.results.columns import FIELDS
 from nlsolve.results.frames import Frames
+from nlsolve.series import Array
 from nlsolve.show.figures.nodes.panels import NodesFigure, snapshots_of
-from nlsolve.show.figures.nodes.sections import Array, slice_triangles, triangulate
-from nlsolve.show.figures.style import SYMBOLS, axis_label, curve_style, finish, join
+from nlsolve.show.figures.nodes.sections import slice_triangles, triangulate
+from nlsolve.show.figures.style import axis_label, curve_style, finish, join
 
 
 class ProfileFigure(NodesFigure):
-    """A nodal value along a line parallel to an axis, linear on the cloud's triangles, and the exact value with it."""
+    """A nodal value, and the exact one, along a line parallel to an axis; both are linear on the cloud's triangles."""
 
     kind: Literal["profile"] = "profile"
     axis: Literal["x", "y"] = Field(description="the coordinate that varies along the line")
@@ -45,7 +47,7 @@ class ProfileFigure(NodesFigure):
             label = "" if number else "exact"
             axes.plot(*pair, color="black", linestyle=(0, (4, 3)), linewidth=0.6, zorder=3, label=label)
         if exacts and len(snapshots) == 1 and not snapshots[0].label:
-            axes.lines[0].set_label(SYMBOLS[self.value])
+            axes.lines[0].set_label(FIELDS[self.value].symbol)
         other = "y" if self.axis == "x" else "x"
         if all(not np.isfinite(line.get_ydata()).any() for line in axes.lines):
             raise self.refuse(f"the line {other} = {self.at:g} mm misses the cloud; move it with `at`")

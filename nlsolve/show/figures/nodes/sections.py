@@ -12,7 +12,7 @@ import pandas as pd
 from matplotlib.tri import Triangulation
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from nlsolve.series import Array
 
 
 def boundaries(rows: pd.DataFrame) -> NDArray[Any]:

@@ -1,0 +1,105 @@
+"""What the commands print: data on standard output as tables or JSON, sentences on standard error."""
+
+from __future__ import annotations
+
+import json
+
+import pandas as pd
+import typer
+from rich.console import Console
+from rich.markup import escape
+from rich.table import Table as RichTable
+
+from nlsolve.contracts.status import Status
+from nlsolve.flow.validity import LIMITS
+from nlsolve.registry.registry import PluginRow
+from nlsolve.results.frames import json_rows
+from nlsolve.running.runner import Results
+
+UNFOLDED = 400
+"""Characters a line may have in a file or a pipe."""
+
+
+def say(sentence: str) -> None:
+    """Print a line on standard error."""
+    typer.echo(sentence, err=True)
+
+
+def count(cases: int) -> str:
+    """1 case, 2 cases"""
+    return f"{cases} case{'' if cases == 1 else 's'}"
+
+
+def stdout() -> Console:
+    """Standard output; tables are not folded when it is a file or a pipe."""
+    console = Console()
+    return console if console.is_terminal else Console(width=UNFOLDED)
+
+
+def print_frame(title: str, frame: pd.DataFrame) -> None:
+    """Print a frame as a table on standard output."""
+    printed = RichTable(title=escape(title))
+    for heading in frame.columns:
+        printed.add_column(escape(str(heading)), overflow="fold")
+    for row in frame.itertuples(index=False):
+        printed.add_row(*(escape(f"{value:.4g}" if isinstance(value, float) else str(value)) for value in row))
+    stdout().print(printed)
+
+
+def print_results(results: Results, as_json: bool) -> None:
+    """Print the declared tables, or the endings of all cases when no table is declared; as JSON all of it."""
+    tables = results.tables()
+    if as_json:
+        shown = {table.spec.name: table.long() for table in tables}
+        document = {"study": results.study.name, "folder": str(results.folder), "runs": json_rows(results.runs)}
+        typer.echo(json.dumps(document | {"tables": shown, "notes": list(results.notes)}))
+        return
+    for declared in tables:
+        for printed in declared.rich():
+            stdout().print(printed)
+    if not tables:
+        swept = list(dict.fromkeys(name for case in results.study.cases for name in case.swept))
+        print_frame(results.study.question, results.runs[["case", *swept, "status", "message"]])
+
+
+def print_plugins(rows: list[PluginRow]) -> None:
+    """Print a table of what is installed, on standard output."""
+    table = RichTable()
+    for heading in ("noun", "kind", "from", "parameters"):
+        table.add_column(heading, overflow="fold")
+    for row in rows:
+        table.add_row(row.noun, row.kind, escape(row.source), escape(_parameters(row)))
+    stdout().print(table)
+
+
+def say_endings(results: Results) -> None:
+    """Say how many cases ended how, with the message of one case of each ending that is no convergence."""
+    runs = results.runs
+    endings = ", ".join(f"{number} {word}" for word, number in runs["status"].value_counts().items())
+    say(f"{count(len(runs))}: {endings}; results in {results.folder}")
+    firsts = {Status.of(run["status"]): run for _, run in runs.drop_duplicates("status").iterrows()}
+    firsts.pop(Status.CONVERGED, None)
+    crash = firsts.pop(Status.CRASHED, None)
+    for status, run in firsts.items():
+        say(f"case {run['case']} ended as {status.word}: {run['message']}")
+    if crash is not None:
+        say(f"case {crash['case']} crashed: {crash['message']}")
+
+
+def left_out(runs: pd.DataFrame) -> list[str]:
+    """Lines with the worst value of each audit over the cases and what to do about it; none when no audit was made."""
+    lines = []
+    for name, limit in LIMITS.items():
+        values = pd.to_numeric(runs[name]).dropna()
+        over = int((values > limit.largest).sum())
+        advice = f"  in {count(over)}: {limit.sentence}" if over else ""
+        if len(values):
+            lines.append(f"  {name.removeprefix('audit.').replace('_', ' '):<23} {values.max():<8.2g}{advice}".rstrip())
+    return ["What the scenes left out, at its largest:", *lines] if lines else []
+
+
+def _parameters(row: PluginRow) -> str:
+    """The parameters of a kind, one on a line, or the reason why it cannot be used."""
+    if row.failure is not None:
+        return row.failure
+    return "\n".join(f"{p.name}: {p.type} = {p.default}  {p.description}" for p in row.parameters)

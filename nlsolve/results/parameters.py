@@ -1,0 +1,34 @@
+"""Which columns of `runs` are parameters of cases and names of settings, and which of them tell cases apart."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import pandas as pd
+
+from nlsolve.results.columns import RUNS
+
+VARIANT = "variant"
+"""Column of `runs` with the names of the settings a case was made by, where a sweep of named settings has no name."""
+
+UNDOTTED = ("record", "counterpart", "error_estimator")
+"""Parameters of a case that are no section, or that stand for a section that may be left out."""
+
+
+def names_settings(column: str) -> bool:
+    """Whether a column of `runs` holds names of settings: neither a measurement nor a parameter (most are dotted)."""
+    return column not in (*RUNS, *UNDOTTED) and "." not in column
+
+
+def differing_parameters(runs: pd.DataFrame) -> list[str]:
+    """Parameters whose values differ between the runs, without those that follow from the names of settings."""
+    words = {str(name): [str(value) for value in runs[name]] for name in runs if name not in RUNS}
+    differing = [name for name, values in words.items() if len(set(values)) > 1]
+    names = [name for name in differing if names_settings(name)]
+    return [name for name in differing if name in names or not settled(words, name, names)]
+
+
+def settled(words: Mapping[str, Sequence[str]], name: str, by: Sequence[str]) -> bool:
+    """Whether runs with the same words in the columns `by` have the same in the column `name`."""
+    keys = list(zip(*(words[column] for column in by), strict=True)) or [()] * len(words[name])
+    return len(set(zip(keys, words[name], strict=True))) == len(set(keys))
