@@ -261,6 +261,11 @@ def step_columns(notes: Mapping[str, Any]) -> dict[str, Any]:
     return {name if name in STEPS else f"{NOTE}{name}": value for name, value in notes.items()}
 
 
+def is_measured(column: str) -> bool:
+    """Whether a column of `runs` holds what was found: described there, or measured by a scene; else a parameter."""
+    return column in RUNS or column.startswith(MEASURED)
+
+
 def run_columns(measures: Mapping[str, Any]) -> dict[str, Any]:
     """What a scene measures of its states, by columns of `runs`: those described there, or "measured.<name>"."""
     return {name if name in RUNS else f"{MEASURED}{name}": value for name, value in measures.items()}

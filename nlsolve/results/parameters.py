@@ -6,23 +6,20 @@ from collections.abc import Mapping, Sequence
 
 import pandas as pd
 
-from nlsolve.results.columns import RUNS
+from nlsolve.results.columns import is_measured
 
 VARIANT = "variant"
 """Column of `runs` with the names of the settings a case was made by, where a sweep of named settings has no name."""
 
-UNDOTTED = ("record", "counterpart", "error_estimator")
-"""Parameters of a case that are no section, or that stand for a section that may be left out."""
-
 
 def names_settings(column: str) -> bool:
-    """Whether a column of `runs` holds names of settings: neither a measurement nor a parameter (most are dotted)."""
-    return column not in (*RUNS, *UNDOTTED) and "." not in column
+    """Whether a column of `runs` holds names of settings: neither a measurement nor a parameter, which is dotted."""
+    return "." not in column and not is_measured(column)
 
 
 def differing_parameters(runs: pd.DataFrame) -> list[str]:
     """Parameters whose values differ between the runs, without those that follow from the names of settings."""
-    words = {str(name): [str(value) for value in runs[name]] for name in runs if name not in RUNS}
+    words = {str(name): [str(value) for value in runs[name]] for name in runs if not is_measured(str(name))}
     differing = [name for name, values in words.items() if len(set(values)) > 1]
     names = [name for name in differing if names_settings(name)]
     return [name for name in differing if name in names or not settled(words, name, names)]

@@ -73,7 +73,7 @@ def solve(
         before = step.state.copy()  # a method may go on working in its array
         measured = {
             "step": number,
-            "tangents": tangent.branches,
+            "tangents": tangent.renewals,
             "triangular_solves": ledger.counts["triangular_solve"],
             "residual_norm": residual_norm,
             "difference": difference,

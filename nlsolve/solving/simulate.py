@@ -132,7 +132,7 @@ class _Run:
     def solved(self, task: Solve) -> Outcome:
         """The case's own method on one problem; its rows, counts and largest residual are kept."""
         parts, k = self.parts, task.increment
-        if not self.tangent.branches:  # in the ordering that the way to the first state settled on
+        if not self.tangent.renewals:  # in the ordering that the way to the first state settled on
             self.tangent = Tangent(parts.linear, parts.refresh, self.ledger, self.start_tangent.factors)
         outcome = solve(task.problem, parts.solver, self.tangent, task.start, parts.stop, parts.budget, self.ledger)
         self.iterations += max(0, len(outcome.steps) - 1)
@@ -140,7 +140,7 @@ class _Run:
         self.false_failure += outcome.denied_wrongly
         self.blame = outcome.blame
         self.rows += [{"increment": k, "time": task.time, "accepted": False, **row} for row in outcome.steps]
-        if self.validity_time is None and self.simulation.increments and self.tangent.branches > 1:
+        if self.validity_time is None and self.simulation.increments and self.tangent.renewals > 1:
             self.validity_time = self.time
         before = self.residual_norm if k else np.nan  # of a steady state the last solve counts: a start may repeat it
         self.residual_norm = float(np.fmax(before, outcome.residual_norm))
@@ -152,7 +152,7 @@ class _Run:
             Progress(
                 max(k, self.increments),
                 max(self.simulation.increments, 1),
-                self.tangent.branches,
+                self.tangent.renewals,
                 self.ledger.counts["factorization"],
             )
         )
@@ -181,7 +181,7 @@ class _Run:
             **self.blame,
             "increments": self.increments,
             "iterations": self.iterations,
-            "tangents": self.tangent.branches,
+            "tangents": self.tangent.renewals,
             "validity_time": validity,
             **ledger.work(),
             **reported(self.rows),

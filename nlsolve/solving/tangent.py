@@ -25,7 +25,7 @@ class Tangent(KeptTangent):
 
     rule : None renews K* at every iteration.
     pattern : factors of a like matrix, which may lend their ordering.
-    branches : how often K* has been factorised.
+    renewals : how often K* has been factorised.
     """
 
     def __init__(
@@ -35,7 +35,7 @@ class Tangent(KeptTangent):
         self._matrix: CountedMatrix | None = None
         self.factors: Factors | None = None
         self.history = TangentHistory()
-        self.branches = 0
+        self.renewals = 0
         self._accounted = 0  # solves whose digits are in the history
         self._told = False  # whether the method has reported a contraction since the last step, with this K*
 
@@ -46,7 +46,7 @@ class Tangent(KeptTangent):
             self._matrix = counted(assemble(), self._ledger)
             self.factors = self._factorized(self._matrix)
             self.history, self._accounted, self._told = TangentHistory(), 0, False
-            self.branches += 1
+            self.renewals += 1
         self.history = replace(self.history, uses=self.history.uses + 1)
         return due
 

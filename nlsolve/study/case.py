@@ -98,7 +98,8 @@ class Composer:
         plain = json.loads(parts.model_dump_json())
         canonical = json.dumps(plain, sort_keys=True, separators=(",", ":"))
         digest = hashlib.sha256(canonical.encode()).hexdigest()[:DIGEST_LETTERS]
-        return Case(digest, parts, *_parameters(plain, points))
+        chosen = {name: section for name, section in plain.items() if section is not None}  # None: left out on purpose
+        return Case(digest, parts, *_parameters(chosen, points))
 
     def parts(self, document: Document) -> BaseModel:
         """The validated components of all sections, those left out at their defaults."""

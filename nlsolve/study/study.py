@@ -15,7 +15,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from nlsolve.registry.problems import ABSENT, Problem, Source, StudyError, problems_in, unknown
 from nlsolve.registry.registry import Registry, load_registry
 from nlsolve.registry.toml_lines import Place, lines_of
-from nlsolve.results.columns import RUNS, no_such_column
+from nlsolve.results.columns import RUNS, is_measured, no_such_column
 from nlsolve.results.parameters import VARIANT, names_settings
 from nlsolve.results.reference_error import REFERENCE
 from nlsolve.show.figures import FigureSpec
@@ -125,7 +125,7 @@ class _Builder:
             for number, figure in enumerate(frame.figure)
             for name, columns in figure.columns_of_runs().items()
             for column in columns
-            if column not in known
+            if column not in known and not is_measured(column)
         ]
         if not frame.timing.calibrate:
             lines = [("table", n) for n, spec in enumerate(frame.table) if spec.crossover is not None]

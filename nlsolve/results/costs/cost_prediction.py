@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 
 from nlsolve.results.aggregates import grouped
-from nlsolve.results.columns import RUNS
+from nlsolve.results.columns import RUNS, is_measured
 from nlsolve.results.costs.unit_costs import COUNTS, PREFIX, UnitCosts
 from nlsolve.results.frames import rows_of
 from nlsolve.results.verdicts import Run, number
@@ -40,7 +40,7 @@ def with_predictions(runs: pd.DataFrame) -> pd.DataFrame:
     """
     if not any(name in runs and runs[name].notna().any() for name in UNITS):
         return runs
-    parameters = [name for name in map(str, runs.columns) if name not in RUNS and "." in name]
+    parameters = [name for name in map(str, runs.columns) if "." in name and not is_measured(name)]
     of_cell = [name for name in parameters if name.split(".")[0] not in OF_THE_METHOD]
     of_case = [name for name in parameters if name.split(".")[0] != "linear"]
     rows = [{**run, "cell": _key(of_cell, run), "same case": _key(of_case, run)} for run in rows_of(runs)]

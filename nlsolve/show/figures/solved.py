@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import LogFormatter
 from pydantic import BeforeValidator, Field
 
-from nlsolve.results.columns import RUNS
+from nlsolve.results.columns import is_measured
 from nlsolve.results.frames import Frames, rows_of
 from nlsolve.results.parameters import differing_parameters, settled
 from nlsolve.results.profiles import band, ratios, within
@@ -192,5 +192,7 @@ class DataFigure(SolvedFigure):
 
 def _problem_columns(runs: pd.DataFrame, group: Names) -> Names:
     """Parameters that differ between the runs of one strategy: they tell its problems apart."""
-    words = {str(name): [str(value) for value in runs[name]] for name in runs if name not in RUNS or name in group}
+    words = {
+        str(name): [str(value) for value in runs[name]] for name in runs if not is_measured(str(name)) or name in group
+    }
     return tuple(name for name in words if name not in group and not settled(words, name, group))

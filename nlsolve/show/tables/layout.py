@@ -10,7 +10,7 @@ import pandas as pd
 
 from nlsolve.registry.problems import ABSENT, Problem, Source, StudyError
 from nlsolve.results.aggregates import key_of
-from nlsolve.results.columns import RUNS, no_such_column
+from nlsolve.results.columns import RUNS, is_measured, no_such_column
 from nlsolve.results.frames import rows_of
 from nlsolve.results.selection import fits, same
 from nlsolve.results.verdicts import AT_A_SOLUTION, OUTCOME, SOLVED, SPEEDUP, Run, number, outcome, solved, status_of
@@ -54,6 +54,7 @@ def check(spec: TableSpec, runs: Sequence[Run], measured: Iterable[str] = MEASUR
     Works on the parameters of cases before anything has been computed, and on rows of `runs` afterwards.
     """
     known = list(dict.fromkeys([*measured, *(name for run in runs for name in run)]))
+    planned = not any("status" in run for run in runs)
     contest = () if spec.cheapest is None else (spec.cheapest.cost, spec.cheapest.error)
     axes = {} if spec.crossover is None else spec.crossover.columns_of_runs()
     problems = [
@@ -69,7 +70,7 @@ def check(spec: TableSpec, runs: Sequence[Run], measured: Iterable[str] = MEASUR
             *((("crossover", field), columns) for field, columns in axes.items()),
         ]
         for name in names
-        if name not in known
+        if name not in known and not (planned and is_measured(name))  # what scenes measure is known afterwards
     ]
     layout = (*spec.rows, *spec.columns)
     unmeasured = {name for name in measured if not all(name in run for run in runs)}
@@ -85,7 +86,11 @@ def check(spec: TableSpec, runs: Sequence[Run], measured: Iterable[str] = MEASUR
     for run in () if spec.count else chosen:
         other = cells.setdefault(key_of(layout, run), run)
         if other is not run:
-            differing = [name for name in run if name not in measured and not same(run[name], other.get(name))]
+            differing = [
+                name
+                for name in run
+                if not (name in measured or is_measured(name)) and not same(run[name], other.get(name))
+            ]
             hint = f"; they differ in {differing[0]!r}: put it in rows, columns or where" if differing else ""
             here = ", ".join(f"{name} = {value!r}" for name, value in zip(layout, key_of(layout, run), strict=True))
             return [Problem(("rows",), list(spec.rows), f"several runs land in the cell {here}{hint}")]

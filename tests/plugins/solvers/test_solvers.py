@@ -126,7 +126,7 @@ def test_a_tangent_outlives_the_solve_it_was_made_in() -> None:
     problem, tangent = ToyProblem(), Tangent(DenseLU(), Never(), Ledger())
     assert tangent.refresh_if_due(lambda: problem.jacobian(START))
     assert not tangent.refresh_if_due(lambda: problem.jacobian(ToyProblem.solution))
-    assert tangent.branches == 1
+    assert tangent.renewals == 1
 
 
 def test_modified_newton_is_newton_but_for_its_rule() -> None:
