@@ -10,20 +10,21 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from nlsolve.algebra.colouring import Compression
+from nlsolve.algebra.formula import FormulaProblem
 from nlsolve.contracts.linear_solver import LinearSolver
 from nlsolve.contracts.nonlinear_solver import NonlinearSolver
 from nlsolve.contracts.outcome import Outcome
-from nlsolve.contracts.problem import Expansion, NonlinearProblem
+from nlsolve.contracts.problem import NonlinearProblem
 from nlsolve.contracts.rules.refresh import RefreshRule
 from nlsolve.contracts.status import SolveError, Status
 from nlsolve.contracts.system import System
-from nlsolve.flow.setup import Progress, Record, reported
+from nlsolve.flow.setup import Progress, Record
 from nlsolve.results.columns import STEPS
-from nlsolve.series import Array, Series
+from nlsolve.series import Array
 from nlsolve.solving.driver import solve
 from nlsolve.solving.ledger import Ledger
 from nlsolve.solving.stopping import Budget, StoppingTest
+from nlsolve.solving.summary import row_of
 from nlsolve.solving.tangent import Tangent
 
 NEAR = 0.01  # of the size of a root: a state is at the root nearer than this
@@ -43,36 +44,6 @@ class AlgebraicSetup:
     budget: Budget = field(default_factory=Budget)
 
 
-class Algebraic(NonlinearProblem):
-    """F(u) = 0; the Jacobian is coefficient 1 of the formula run on u with the seeds of all groups of columns beside
-    one another.
-
-    Its scale is 1: the published sets are judged by an absolute residual (‖F‖∞ < 1e-6 for the 23 problems), and F alone
-    does not tell the size of what cancels in it. `stop.tolerance` therefore is a bound on ‖F‖₂ itself.
-    """
-
-    def __init__(self, system: System) -> None:
-        self.is_gradient = system.is_gradient
-        self._formula = system.formula
-        self._compression = Compression(system.pattern(), len(system.standard_start()))
-
-    def residual(self, u: Array) -> Array:
-        """F(u)."""
-        return self._formula(u)
-
-    def jacobian(self, u: Array) -> Any:
-        """J(u), sparse (U, U)."""
-        seeds = self._compression.seeds
-        path = Series(np.broadcast_to(u[:, None], seeds.shape))
-        path.append(seeds)
-        return self._compression.unpack(self._formula(path).coefficient(1))
-
-    def expand(self, u: Array) -> Expansion:
-        """The same formula, run on a series that begins with u."""
-        path = Series(u)
-        return Expansion(path, self._formula(path))
-
-
 @np.errstate(all="ignore")  # what is not finite becomes a status, a doubt or a NaN
 def solve_system(
     setup: AlgebraicSetup,
@@ -83,38 +54,21 @@ def solve_system(
     ledger = Ledger(clock)
     tangent = Tangent(setup.linear, setup.refresh, ledger)
     with ledger.entry("operators"):
-        problem = Algebraic(setup.scene)
+        problem = FormulaProblem.of(setup.scene)
     start = setup.scene.start()
     outcome = solve(problem, setup.solver, tangent, start, setup.stop, setup.budget, ledger)
-    error = root_error(setup.scene, outcome.state)
-    doubt = ""
-    if outcome.status is Status.CONVERGED and not error <= NEAR:
-        outcome, doubt = verified(problem, outcome, setup.linear, known=not np.isnan(error))
-    solved = outcome.status in (Status.CONVERGED, Status.OTHER_ROOT)
+    outcome, judgement = judged(setup.scene, problem, outcome, setup.linear)
     if listen is not None:
         listen(Progress(1, 1, tangent.branches, ledger.counts["factorization"]))
-    said = outcome.status.sentence
     summary: dict[str, Any] = {
-        "status": outcome.status.word,
-        "message": said if outcome.detail == said else f"{said}; {outcome.detail}",
-        "unknowns": len(start),
-        "increments": int(solved),
-        "iterations": max(0, len(outcome.steps) - 1),
-        "branches": tangent.branches,
-        "said_converged_but_is_not": int(outcome.claimed_wrongly),
-        "said_failed_but_is": int(outcome.denied_wrongly),
-        **outcome.blame,
-        **ledger.work(),
-        **reported(outcome.steps),
+        **row_of(outcome, ledger, tangent),
+        "increments": int(outcome.converged),
+        "seconds_operators": ledger.seconds["operators"],
         "seconds_all": ledger.seconds["method"] + ledger.seconds["operators"],
-        **tangent.facts(),
-        "residual_norm": outcome.residual_norm,
-        "root_error": error,
-        "root_singular": setup.scene.singular,
-        "doubt": doubt,
+        **judgement,
     }
-    rows = [{"increment": 0, "accepted": False, **row} for row in outcome.steps]
-    if solved:
+    rows = [{"increment": 0, "accepted": False, **row} for row in outcome.rows]
+    if outcome.converged:
         rows[-1]["accepted"] = True
     return Record(
         summary,
@@ -122,6 +76,16 @@ def solve_system(
         problem=problem,
         state=outcome.state,
     )
+
+
+def judged(
+    system: System, problem: NonlinearProblem, outcome: Outcome, linear: LinearSolver
+) -> tuple[Outcome, dict[str, Any]]:
+    """The outcome held against the known roots of a system, and what `runs` is told of that."""
+    error, doubt = root_error(system, outcome.state), ""
+    if outcome.status is Status.CONVERGED and not error <= NEAR:
+        outcome, doubt = verified(problem, outcome, linear, known=not np.isnan(error))
+    return outcome, {"root_error": error, "root_singular": system.singular, "doubt": doubt}
 
 
 def root_error(system: System, u: Array) -> float:

@@ -15,7 +15,7 @@ from nlsolve.flow.continuation import Stage, walk
 from nlsolve.flow.momentum import Flow
 from nlsolve.flow.moving_nodes import Markers
 from nlsolve.flow.observables import divergence, nodal_fields, velocity_error, wall_reaction
-from nlsolve.flow.setup import Progress, Record, Setup, reported
+from nlsolve.flow.setup import Progress, Record, Setup
 from nlsolve.flow.state import Balance
 from nlsolve.flow.validity import audit
 from nlsolve.results.columns import STEPS
@@ -23,6 +23,7 @@ from nlsolve.series import Array
 from nlsolve.solving.driver import solve
 from nlsolve.solving.ledger import Ledger
 from nlsolve.solving.stopping import StoppingTest
+from nlsolve.solving.summary import reported
 from nlsolve.solving.tangent import Tangent
 
 
@@ -106,7 +107,7 @@ class _March:
             self.record_fields_if_due()
         elif not steady or stage.load < 1.0 or stage.law is not self.setup.law:
             detail = f"on the way to the first state, at {start.by} = {stage.value:g}: {outcome.detail}"
-            return Outcome(outcome.status, detail, outcome.state, outcome.residual_norm, ())
+            return Outcome(outcome.status, detail, outcome.state, outcome.residual_norm)
         return outcome
 
     def take_over(self) -> None:
@@ -157,11 +158,11 @@ class _March:
         guess = setup.start.disturbed(flow, flow.unknowns(self.balance.guess), k)
         outcome = solve(flow, setup.solver, self.tangent, guess, setup.stop, setup.budget, self.ledger)
         solved = outcome.status is Status.CONVERGED
-        self.iterations += max(0, len(outcome.steps) - 1)
+        self.iterations += outcome.iterations
         self.claimed_wrongly += outcome.claimed_wrongly
         self.denied_wrongly += outcome.denied_wrongly
         self.blame = outcome.blame
-        self.rows += [{"increment": k, "time": self.balance.time, "accepted": False, **row} for row in outcome.steps]
+        self.rows += [{"increment": k, "time": self.balance.time, "accepted": False, **row} for row in outcome.rows]
         if self.validity_time is None and self.scene.increments and self.tangent.branches > 1:
             self.validity_time = (k - 1) * self.scene.increment
         before = self.residual_norm if k else np.nan  # of a steady scene the last solve counts: a start may repeat it
@@ -226,6 +227,7 @@ class _March:
             "start_factorizations": start.counts["factorization"],
             "start_triangular_solves": start.counts["triangular_solve"],
             "start_residuals": start.counts["residual"],
+            "seconds_operators": ledger.seconds["operators"],
             "seconds_start": start.seconds["stage"],
             "seconds_all": ledger.seconds["method"] + ledger.seconds["operators"] + start.seconds["stage"],
             **self.tangent.facts(),

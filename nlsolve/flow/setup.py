@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -17,7 +16,6 @@ from nlsolve.contracts.problem import NonlinearProblem
 from nlsolve.contracts.rules.predictor import Predictor
 from nlsolve.contracts.rules.refresh import RefreshRule
 from nlsolve.flow.continuation import Start
-from nlsolve.results.columns import REPORTED
 from nlsolve.series import Array
 from nlsolve.solving.stopping import Budget, StoppingTest
 
@@ -65,9 +63,3 @@ class Record:
     fields: pd.DataFrame = field(default_factory=pd.DataFrame)
     problem: NonlinearProblem | None = None
     state: Array | None = None
-
-
-def reported(rows: Sequence[Mapping[str, Any]]) -> dict[str, float | None]:
-    """What the method's library says it did, over all rows of `steps`; None where it says nothing."""
-    said = {name: [row[name] for row in rows if name in row] for name in REPORTED}
-    return {name: sum(numbers) if numbers else None for name, numbers in said.items()}

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import time
-import traceback
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -27,6 +26,7 @@ from nlsolve.running.timing import CLOCKS, measure
 from nlsolve.show.figures import FigureError, draw, save
 from nlsolve.show.report import write_report
 from nlsolve.show.tables import Table, build
+from nlsolve.solving.summary import crashed
 from nlsolve.study.case import Case
 from nlsolve.study.study import Study
 from nlsolve.study.timing import Timing
@@ -142,9 +142,7 @@ def execute(case: Case, number: int, cases: int, tell: Listener, timing: Timing)
             record = march(setup, listen, clock) if isinstance(setup, Setup) else solve_system(setup, listen, clock)
             units = unit_costs(record, setup.linear, clock) if timing.calibrate else {}
     except Exception as error:  # the one boundary at which a crash turns into a result
-        place = traceback.extract_tb(error.__traceback__)[-1]
-        message = f"{type(error).__name__}: {error} ({place.filename}:{place.lineno})"
-        summary: dict[str, Any] = {"status": Status.CRASHED.word, "message": message}
+        summary: dict[str, Any] = crashed(error)
         steps = fields = pd.DataFrame()
     else:
         timed = {"rounds": 1, "seconds_most": record.summary.get("seconds"), "clock": timing.clock}

@@ -19,7 +19,8 @@ import numpy as np
 import scipy.optimize
 from threadpoolctl import threadpool_limits
 
-from nlsolve.algebra.simulation import Algebraic, AlgebraicSetup
+from nlsolve.algebra.formula import FormulaProblem
+from nlsolve.algebra.simulation import AlgebraicSetup
 from nlsolve.contracts.linear_solver import LinearSolver
 from nlsolve.contracts.problem import Expansion, NonlinearProblem
 from nlsolve.flow.setup import Setup
@@ -62,7 +63,7 @@ def calibrate(setup: Setup | AlgebraicSetup, rounds: int = ROUNDS) -> Calibratio
     """
     with threadpool_limits(limits=1):
         if isinstance(setup, AlgebraicSetup):
-            system, start = Algebraic(setup.scene), setup.scene.start()
+            system, start = FormulaProblem.of(setup.scene), setup.scene.start()
             return Calibration(None, len(start), 0.0, measure(system, setup.linear, start, rounds))
         problem, state, ledger = sample(setup)
         unit = measure(problem, setup.linear, state, rounds)

@@ -31,7 +31,7 @@ def solve(
     ledger: Ledger,
 ) -> Outcome:
     """Take steps of `solver` on `problem` from `start` until the stopping test, the budget or a failure ends it."""
-    audited = Audited(problem, ledger)
+    audited, begun, tangents = Audited(problem, ledger), ledger.copy(), tangent.branches
     scale = audited.scale(start)
     before, rows = start, list[dict[str, Any]]()
     residual_norm = np.inf
@@ -41,8 +41,19 @@ def solve(
         blame: Mapping[str, float] = {}
         if status is not Status.CONVERGED and np.isfinite(before).all():
             blame = problem.blame(before, audited.residual(before))
-        sentence = detail or status.sentence
-        return Outcome(status, sentence, before, float(residual_norm), tuple(rows), claimed, denied, blame)
+        spent = ledger.since(begun)
+        return Outcome(
+            status,
+            detail or status.sentence,
+            before,
+            float(residual_norm),
+            tuple(rows),
+            claimed,
+            denied,
+            blame,
+            {**spent.counted(), "tangents": tangent.branches - tangents},
+            spent.timed(),
+        )
 
     if not np.isfinite(scale):
         return ended(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from nlsolve.algebra.simulation import Algebraic
+from nlsolve.algebra.formula import FormulaProblem
 from nlsolve.contracts.continuum.law import ConstitutiveLaw
 from nlsolve.contracts.continuum.scene import Scene
 from nlsolve.contracts.system import System
@@ -55,7 +55,7 @@ def check_system(system: System, tolerance: float = 1e-6) -> None:
     require(together.shape == states.shape, f"F of shape {together.shape} for states of shape {states.shape}")
     for column, state in zip(together.T, states.T, strict=True):
         same(column, system.formula(state), norm(column) or 1.0, "F of several columns against F of each", 1e-12)
-    problem = Algebraic(system)
+    problem = FormulaProblem.of(system)
     check_problem(problem, states[:, 0], tolerance)
     pattern = system.pattern()
     if pattern is not None:
