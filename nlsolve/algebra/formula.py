@@ -14,6 +14,12 @@ from nlsolve.contracts.status import InputError, SolveError, Status
 from nlsolve.contracts.system import System
 from nlsolve.series import Array, Series
 
+NUMBERS = "iuf"
+"""Kinds of NumPy's types that become real numbers."""
+
+LONGEST_VALUE = 60
+"""Characters of a wrong value that are worth repeating."""
+
 UNFIT = (AttributeError, IndexError, TypeError, ValueError)
 """What Python and NumPy raise when a formula for arrays asks of a series what only an array has."""
 
@@ -58,32 +64,34 @@ class FormulaProblem(NonlinearProblem):
         """J(u), sparse (U, U). Raises SolveError (not applicable) where there is none, InputError for a wrong one."""
         if self._given is not None:
             return _matrix(self._given(u), len(u))
-        try:
-            return self._compression.unpack(self._derivative(u, self._compression.seeds))
-        except UNFIT as error:
-            raise SolveError(
-                Status.NOT_APPLICABLE,
-                "the Jacobian is made by running F on a power series, which it does not allow: give a `jacobian`, or "
-                f"choose a method that asks for none, such as scipy-root without precondition; {_said(error)}",
-            ) from error
+        return self._compression.unpack(self.derivative(u, self._compression.seeds))
 
     def expand(self, u: Array) -> Expansion:
-        """The same formula, run on a series that begins with u. Raises SolveError (not applicable) where it cannot be."""
+        """The formula run on a series that begins with u. Raises SolveError (not applicable) where it cannot be."""
         path = Series(u)
         try:
             return Expansion(path, self._along(path))
         except UNFIT as error:
             raise SolveError(
                 Status.NOT_APPLICABLE,
-                "the method runs F on a power series, which it does not allow: choose a method that asks for residuals "
-                f"and Jacobians only, such as newton; {_said(error)}",
+                "it is expanded by running F on a power series, and F does not run on one: choose a method that asks "
+                f"for residuals and Jacobians only, such as newton ({_said(error)})",
             ) from error
 
-    def _derivative(self, u: Array, seeds: Array) -> Array:
-        """J(u) S for directions S, (U, C)."""
-        if not self._columns:
-            return np.stack([self._along(_seeded(u, seed)).coefficient(1) for seed in seeds.T], axis=1)
-        return self._along(_seeded(np.broadcast_to(u[:, None], seeds.shape), seeds)).coefficient(1)
+    def derivative(self, u: Array, directions: Array) -> Array:
+        """J(u) S for directions S, (U, C), from the formula. Raises SolveError (not applicable) where it cannot be."""
+        try:
+            if self._columns:
+                base = np.broadcast_to(u[:, None], directions.shape)
+                return self._along(_seeded(base, directions)).coefficient(1)
+            products = [self._along(_seeded(u, w)).coefficient(1) for w in directions.T]
+            return np.stack(products, axis=1) if products else directions
+        except UNFIT as error:
+            raise SolveError(
+                Status.NOT_APPLICABLE,
+                "its Jacobian is made by running F on a power series, and F does not run on one: give `jacobian`, or "
+                f"choose a method that asks for none, such as scipy-root without precondition ({_said(error)})",
+            ) from error
 
     def _along(self, path: Series) -> Series:
         """F(u(a)); a list or an array of the equations, each a series or a number, is put together."""
@@ -114,26 +122,30 @@ def real(values: Any, shape: tuple[int, ...], name: str) -> Array:
     """`values` as an array of real numbers of this shape. Raises InputError that says what `name` is instead."""
     if type(values) is np.ndarray and values.dtype == np.float64 and values.shape == shape:
         return values
+    text = repr(values)
+    found = f"{name} = {text}" if len(text) <= LONGEST_VALUE and "\n" not in text else name
+    wanted = f"should be real numbers of shape {shape}"
     if values is None:
-        raise InputError(f"{name} = None: should be numbers of shape {shape}; does the function return them?")
+        raise InputError(f"{found}: {wanted}; does the function return them?")
     try:
         array = np.asarray(values)
-    except ValueError as error:  # lists of several lengths
-        raise InputError(f"{name}: should be numbers of shape {shape}, not lists of several lengths") from error
+    except ValueError as error:
+        raise InputError(f"{found}: {wanted}, not lists of several lengths") from error
     if array.dtype.kind == "c":
-        raise InputError(f"{name}: should be real, not complex: make real and imaginary parts unknowns of their own")
-    if array.dtype.kind not in "iuf":
-        raise InputError(f"{name}: should be numbers of shape {shape}, not of type {array.dtype.name}")
+        raise InputError(f"{found}: {wanted}; make real and imaginary parts unknowns of their own")
+    if array.dtype.kind not in NUMBERS:
+        raise InputError(f"{found}: {wanted}, not {array.dtype.type.__name__.removesuffix('_')}")
     if array.shape != shape:
-        raise InputError(f"{name} has shape {array.shape}: should have shape {shape}, an equation for each unknown")
+        raise InputError(f"{found}: {wanted}, and has shape {array.shape}")
     return array.astype(float)
 
 
 def _matrix(values: Any, size: int) -> Any:
     """A given Jacobian, sparse (U, U)."""
-    if sp.issparse(values):
-        real(values.data, values.data.shape, "jacobian(u)")
-        if values.shape != (size, size):
-            raise InputError(f"jacobian(u) has shape {values.shape}: should have shape {(size, size)}")
-        return sp.csr_array(values, dtype=float)
-    return sp.csr_array(real(values, (size, size), "jacobian(u)"))
+    if not sp.issparse(values):
+        return sp.csr_array(real(values, (size, size), "jacobian(u)"))
+    if values.shape != (size, size):
+        raise InputError(f"jacobian(u): should have shape {(size, size)}, and has shape {values.shape}")
+    matrix = sp.csr_array(values)
+    matrix.data = real(matrix.data, matrix.data.shape, "entries of jacobian(u)")
+    return matrix

@@ -6,7 +6,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-import numpy as np
 import pandas as pd
 
 from nlsolve.contracts.status import Status
@@ -63,19 +62,31 @@ class Outcome:
         return pd.DataFrame(list(self.rows))
 
     def __repr__(self) -> str:
-        counts = ", ".join(f"{number} {_words(name)}" for name, number in self.counts.items() if number)
+        counts = ", ".join(_counted(number, name) for name, number in self.counts.items() if number)
         seconds = ", ".join(f"{_words(kind)} {value:.2g}" for kind, value in self.seconds.items() if value > 0.0)
-        entries = np.array2string(self.state, precision=4, threshold=SHOWN, edgeitems=SHOWN // 2, separator=", ")
         lines = {
             "status": f"{self.status.word}: {self.message}",
             "residual": f"{self.residual_norm:.2g}",
             "iterations": f"{self.iterations}",
             "work": counts or "none",
             "seconds": f"{sum(self.seconds.values()):.2g}" + (f": {seconds}" if seconds else ""),
-            "state": f"{entries}, {len(self.state)} unknowns",
+            "state": _entries(self.state),
         }
         return "\n".join(f"{name:<10}  {text}" for name, text in lines.items())
 
 
 def _words(name: str) -> str:
     return name.replace("_", " ")
+
+
+def _counted(number: int, name: str) -> str:
+    """1 residual, 2 residuals"""
+    return f"{number} {_words(name.removesuffix('s') if number == 1 else name)}"
+
+
+def _entries(state: Array) -> str:
+    """A short state, or both ends of a long one."""
+    shown = [f"{value:.4g}" for value in state]
+    if len(shown) > SHOWN:
+        shown = [*shown[: SHOWN // 2], "…", *shown[-SHOWN // 2 :]]
+    return f"{', '.join(shown)} ({_counted(len(state), 'unknowns')})"

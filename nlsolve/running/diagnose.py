@@ -9,6 +9,7 @@ import pandas as pd
 
 from nlsolve.contracts.status import SolveError
 from nlsolve.flow.setup import Setup
+from nlsolve.registry.component_tables import class_name
 from nlsolve.results.columns import DIAGNOSTICS
 from nlsolve.results.verdicts import names_settings
 from nlsolve.study.study import Study
@@ -32,13 +33,14 @@ def diagnose(study: Study) -> pd.DataFrame:
         setup = case.setup
         named = {name: case.parameters[name] for name in case.swept if telling(name)}
         if not isinstance(setup, Setup):
-            key = setup.scene.model_dump_json()
+            key = class_name(type(setup.scene)) + setup.scene.model_dump_json()
             rows += [{**named, "operator": NO_CLOUD}] if key not in seen else []
             seen.add(key)
             continue
         try:
             cloud = setup.scene.cloud(setup.law)
-            key = hashlib.sha256(cloud.nodes.tobytes() + setup.discretizer.model_dump_json().encode()).hexdigest()
+            discretizer = class_name(type(setup.discretizer)) + setup.discretizer.model_dump_json()
+            key = hashlib.sha256(cloud.nodes.tobytes() + discretizer.encode()).hexdigest()
             if key in seen:
                 continue
             seen.add(key)

@@ -11,6 +11,7 @@ from nlsolve.algebra.simulation import AlgebraicSetup
 from nlsolve.contracts.component import Component
 from nlsolve.contracts.status import SolveError
 from nlsolve.flow.setup import Setup
+from nlsolve.registry.component_tables import class_name
 from nlsolve.running.timing import calibrate
 from nlsolve.study.study import Study
 
@@ -53,7 +54,7 @@ def forecast(study: Study) -> pd.DataFrame:
             increments = max(1, setup.scene.increments)
             clouds = 1 + (increments if setup.scene.motion_of_nodes != "fixed" else 0)
             stages = len(setup.start.stages(setup.law))
-        key = "".join(part.model_dump_json() for part in parts)
+        key = "".join(class_name(type(part)) + part.model_dump_json() for part in parts)
         if key not in measured:
             measured[key] = costs_of(setup)
         costs = measured[key]

@@ -14,7 +14,7 @@ import pandas as pd
 from pandas.api.types import is_object_dtype
 from pyarrow import ArrowException
 
-from nlsolve.contracts.status import Status
+from nlsolve.contracts.status import InputError, Status
 from nlsolve.results.columns import FIELDS, RUNS, STEPS
 from nlsolve.results.frames import Frames
 from nlsolve.show.tables import TableSpec
@@ -24,7 +24,7 @@ STUDY, CASES = "study.json", "cases"
 TRIED_AGAIN = {Status.CRASHED.word, Status.NOT_APPLICABLE.word}
 
 
-class StoreError(ValueError):
+class StoreError(InputError):
     """A results folder that cannot be used: one sentence with the way out."""
 
 

@@ -51,7 +51,7 @@ def solve(
             claimed,
             denied,
             blame,
-            {**spent.counted(), "tangents": tangent.branches - tangents},
+            {"tangents": tangent.branches - tangents, **spent.counted()},
             spent.timed(),
         )
 

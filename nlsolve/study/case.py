@@ -9,12 +9,15 @@ from dataclasses import dataclass, fields
 from typing import Annotated, Any
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, create_model
+from pydantic_core import PydanticSerializationError, to_jsonable_python
 
 from nlsolve.algebra.simulation import AlgebraicSetup
 from nlsolve.contracts.component import Component
+from nlsolve.contracts.nonlinear_solver import NonlinearSolver
 from nlsolve.contracts.system import System
 from nlsolve.flow.continuation import LOAD, Start
 from nlsolve.flow.setup import Setup
+from nlsolve.registry.component_tables import ComponentTable, class_name
 from nlsolve.registry.problems import ABSENT, Problem, problems_in
 from nlsolve.registry.registry import CONTRACTS, Registry
 from nlsolve.results.verdicts import names_settings
@@ -98,12 +101,11 @@ class Composer:
         composition = self.composition(document, of_a_system)
         chosen = {name: getattr(composition, name) for name in (OF_A_SYSTEM if of_a_system else SECTIONS)}
         setup = AlgebraicSetup(**chosen) if of_a_system else Setup(**chosen)
-        if setup.stop.kind == "claim" and not setup.solver.claims:
-            sentence = f"the solver {setup.solver.kind_name()!r} never claims a solution; use residual or difference"
-            raise Invalid([Problem(("stop", "kind"), "claim", sentence)])
+        if unclaimed := claims_missing(setup.solver, setup.stop):
+            raise Invalid(unclaimed)
         if isinstance(setup, Setup):
             _check_continuation(setup)
-        plain = json.loads(composition.model_dump_json())
+        plain = self.plain(composition)
         canonical = json.dumps(plain, sort_keys=True, separators=(",", ":"))
         digest = hashlib.sha256(canonical.encode()).hexdigest()[:DIGEST_LETTERS]
         return Case(digest, setup, *_parameters(plain, points))
@@ -128,20 +130,56 @@ class Composer:
         except ValidationError as error:
             raise Invalid(problems_in(error, model, document)) from error
 
+    def plain(self, composition: BaseModel) -> dict[str, Any]:
+        """The sections as JSON has them. A component that is not of the installed class of its kind has its `class`
+        beside it, so that cases of two classes differ.
+        """
+        try:
+            plain = json.loads(composition.model_dump_json())
+        except PydanticSerializationError as error:
+            sentence = f"a field cannot be written as JSON, by which cases are told apart: {error}"
+            raise Invalid([Problem((name,), ABSENT, sentence) for name in unwritable(composition)]) from error
+        for name in plain:
+            self._add_class(plain[name], getattr(composition, name))
+        return plain
+
+    def _add_class(self, plain: Any, value: object) -> None:
+        if not isinstance(value, Component):
+            return
+        for name in type(value).model_fields:
+            self._add_class(plain.get(name), getattr(value, name))
+        if value.noun in CONTRACTS and not self.registry.is_installed(value):
+            plain["class"] = class_name(type(value))
+
     def named(self, document: Document, section: str) -> type[Component]:
-        """The installed class that a section names, or is; Component itself where there is none."""
-        given = document.get(section)
-        if isinstance(given, Component):
-            return type(given)
-        kind = given.get("kind") if isinstance(given, dict) else None
-        return self.registry.classes(section).get(kind, Component) if isinstance(kind, str) else Component
+        """The class that a section names, or is of; Component itself where there is none."""
+        return self.registry.class_of(section, document.get(section)) or Component
 
 
 def _complete(document: Document, section: str, default: Mapping[str, Any]) -> None:
     """Give a section that names no kind its default."""
     given = document.get(section, {})
-    if isinstance(given, dict) and "kind" not in given:
+    if isinstance(given, dict) and "kind" not in given and not isinstance(given, ComponentTable):
         document[section] = {**default, **given}
+
+
+def claims_missing(solver: NonlinearSolver, stop: StoppingTest) -> list[Problem]:
+    """The problem of a stopping test that waits for a claim which the method never makes; none otherwise."""
+    if stop.kind != "claim" or solver.claims:
+        return []
+    sentence = f"the solver {solver.kind_name()!r} never claims a solution; use residual or difference"
+    return [Problem(("stop", "kind"), "claim", sentence)]
+
+
+def unwritable(composition: BaseModel) -> list[str]:
+    """The sections that JSON cannot hold."""
+    found = []
+    for name in type(composition).model_fields:
+        try:
+            to_jsonable_python(getattr(composition, name))
+        except PydanticSerializationError:
+            found.append(name)
+    return found
 
 
 def _check_continuation(setup: Setup) -> None:
