@@ -80,7 +80,7 @@ class Results:
         return _tables(self.study, self.runs)[0]
 
     def table(self, name: str) -> pd.DataFrame:
-        """The cells of a declared table."""
+        """The cells of a declared table. Raises StudyError where none has this name."""
         for spec in self.study.tables:
             if spec.name == name:
                 return build(spec, self.runs).cells
@@ -99,7 +99,10 @@ def run(
     """Run every case of a study that has not been run before, and keep the results in `out` (None: in memory).
 
     An interruption loses the running case only; the same call again does the rest. Cases that crashed, or whose method
-    did not apply, are tried again.
+    did not apply, are tried again. `listen` is told of each `Event`.
+
+    Raises StudyError for a study that cannot be run as it is written, StoreError for a folder that cannot hold its
+    results.
     """
     study = _study(study, overrides, quick)
     store = None if out is None else Store(Path(out), study)
