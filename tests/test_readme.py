@@ -1,4 +1,4 @@
-"""The README's promises: its Python prints what is shown, its two commands are there, its studies are the shipped ones."""
+"""The README's promises: its Python prints what is shown, its two commands work, its studies are the shipped ones."""
 
 from __future__ import annotations
 
