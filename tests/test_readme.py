@@ -11,6 +11,7 @@ from types import ModuleType
 
 import pytest
 
+import nlsolve
 from nlsolve.plugin import NonlinearSolver
 from nlsolve.registry.registry import Registry
 from nlsolve.study.study import Study
@@ -46,6 +47,11 @@ def test_every_block_prints_what_is_shown(session):
     assert sum(map(bool, shown)) == 3
     for printed, text in zip(session[1], shown, strict=True):
         assert untimed(printed) == untimed(text)
+
+
+def test_every_public_name_is_explained():
+    table = README[README.index("| from `nlsolve` |") :].split("\n\n")[0]
+    assert set(re.findall(r"`(\w+)`", table)) - {"nlsolve"} == set(nlsolve.__all__) - {"__version__"}
 
 
 def test_the_solver_of_the_readme_keeps_the_contract(session):
