@@ -10,8 +10,13 @@ from importlib.metadata import PackageNotFoundError, version
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from nlsolve.contracts.status import SolveError, Status
-    from nlsolve.running.runner import Results, run
+    from nlsolve.contracts.outcome import Outcome
+    from nlsolve.contracts.status import InputError, SolveError, Status
+    from nlsolve.registry.problems import StudyError
+    from nlsolve.running.interactive import compare, solve
+    from nlsolve.running.runner import Event, Results, run
+    from nlsolve.running.store import StoreError
+    from nlsolve.solving.simulate import Progress
     from nlsolve.study.study import Study
 
 try:
@@ -20,14 +25,37 @@ except PackageNotFoundError:  # a checkout on the path, not installed: no plugin
     __version__ = "not installed"
 
 _HOME = {
+    "Event": "nlsolve.running.runner",
+    "InputError": "nlsolve.contracts.status",
+    "Outcome": "nlsolve.contracts.outcome",
+    "Progress": "nlsolve.solving.simulate",
     "Results": "nlsolve.running.runner",
     "SolveError": "nlsolve.contracts.status",
     "Status": "nlsolve.contracts.status",
+    "StoreError": "nlsolve.running.store",
     "Study": "nlsolve.study.study",
+    "StudyError": "nlsolve.registry.problems",
+    "compare": "nlsolve.running.interactive",
     "run": "nlsolve.running.runner",
+    "solve": "nlsolve.running.interactive",
 }
 
-__all__ = ["Results", "SolveError", "Status", "Study", "__version__", "run"]
+__all__ = [
+    "Event",
+    "InputError",
+    "Outcome",
+    "Progress",
+    "Results",
+    "SolveError",
+    "Status",
+    "StoreError",
+    "Study",
+    "StudyError",
+    "__version__",
+    "compare",
+    "run",
+    "solve",
+]
 
 
 def __getattr__(name: str) -> Any:

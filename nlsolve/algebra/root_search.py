@@ -8,49 +8,16 @@ from typing import Any
 
 import numpy as np
 
-from nlsolve.algebra.colouring import Compression
 from nlsolve.contracts.linear_solver import LinearSolver
 from nlsolve.contracts.outcome import Outcome
-from nlsolve.contracts.problem import Expansion, NonlinearProblem
+from nlsolve.contracts.problem import NonlinearProblem
 from nlsolve.contracts.scene import Simulation, Solve
 from nlsolve.contracts.status import SolveError, Status
-from nlsolve.series import Array, Series
+from nlsolve.series import Array
 
 NEAR = 0.01  # of the size of a root: a state is at the root nearer than this
 POLISHING = 10  # Newton steps that must not lead further away than that from a root nobody has listed
 DENSE = 300  # unknowns up to which these steps are least squares of least norm, which a singular Jacobian allows
-
-
-class Algebraic(NonlinearProblem):
-    """F(u) = 0; the Jacobian is coefficient 1 of the formula run on u with the seeds of all groups of columns beside
-    one another.
-
-    Its scale is 1: the published sets are judged by an absolute residual (‖F‖∞ < 1e-6 for the 23 problems), and F alone
-    does not tell the size of what cancels in it. `stop.tolerance` therefore is a bound on ‖F‖₂ itself.
-    """
-
-    def __init__(
-        self, formula: Callable[[Any], Any], unknowns: int, pattern: Any | None = None, is_gradient: bool = False
-    ) -> None:
-        self.is_gradient = is_gradient
-        self._formula = formula
-        self._compression = Compression(pattern, unknowns)
-
-    def residual(self, u: Array) -> Array:
-        """F(u)."""
-        return self._formula(u)
-
-    def jacobian(self, u: Array) -> Any:
-        """J(u), sparse (U, U)."""
-        seeds = self._compression.seeds
-        path = Series(np.broadcast_to(u[:, None], seeds.shape))
-        path.append(seeds)
-        return self._compression.unpack(self._formula(path).coefficient(1))
-
-    def expand(self, u: Array) -> Expansion:
-        """The same formula, run on a series that begins with u."""
-        path = Series(u)
-        return Expansion(path, self._formula(path))
 
 
 class RootSearch(Simulation):

@@ -14,7 +14,9 @@ from typing import Any, ClassVar
 import numpy as np
 from pydantic import Field
 
-from nlsolve.algebra.root_search import Algebraic, RootSearch
+from nlsolve.algebra.formula import FormulaProblem
+from nlsolve.algebra.root_search import RootSearch
+from nlsolve.contracts.linear_solver import LinearSolver
 from nlsolve.contracts.nonlinear_solver import NonlinearSolver
 from nlsolve.contracts.scene import Entry, Scene, Section
 from nlsolve.series import Array
@@ -83,11 +85,16 @@ class System(Scene, ABC):
         roots = self.roots()
         return None if roots is None else roots[np.linalg.norm(roots - u, axis=1).argmin()]
 
-    def equations(self) -> Algebraic:
-        """F with its Jacobian and its expansion."""
-        return Algebraic(self.formula, len(self.standard_start()), self.pattern(), self.is_gradient)
+    def equations(self) -> FormulaProblem:
+        """F with its Jacobian by groups of columns and its expansion."""
+        size = len(self.standard_start())
+        return FormulaProblem(self.formula, size, self.pattern(), columns=True, is_gradient=self.is_gradient)
 
-    def simulation(self, parts: Any, entry: Entry) -> RootSearch:
+    def search(self, start: Array, linear: LinearSolver, entry: Entry) -> RootSearch:
+        """A search from any start (U,), judged by the roots that are known."""
         with entry("operators"):
             problem = self.equations()
-        return RootSearch(problem, self.start(), parts.linear, self.nearest_root, self.singular)
+        return RootSearch(problem, start, linear, self.nearest_root, self.singular)
+
+    def simulation(self, parts: Any, entry: Entry) -> RootSearch:
+        return self.search(self.start(), parts.linear, entry)

@@ -23,7 +23,8 @@ class Component(BaseModel):
 
     def with_(self, **changes: Any) -> Self:
         """A copy with some fields changed, validated like a new one."""
-        return type(self).model_validate({**self.model_dump(), **changes})
+        fields = {name: getattr(self, name) for name in type(self).model_fields}
+        return type(self).model_validate({**fields, **changes})
 
     absent: ClassVar[str | None] = None
     """Why the kind cannot be used here, and the way out: "needs the library x: pip install …"; None when it can."""

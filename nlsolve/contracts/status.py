@@ -42,6 +42,10 @@ class Status(Enum):
         return self.value
 
 
+class InputError(ValueError):
+    """A mistake of the caller: one sentence that names the place, the value there, and the way out."""
+
+
 class SolveError(Exception):
     """An ending discovered deep inside a computation; the driver turns it into a status, never the user's traceback."""
 

@@ -144,7 +144,7 @@ def _adaptive(
         trial = yield from solve(stage, stage is target)
         if trial.status is Status.CONVERGED:
             outcome, reached, here = trial, part, stage
-            step *= 2.0 if len(trial.steps) - 1 <= EASY else 1.0
+            step *= 2.0 if trial.iterations <= EASY else 1.0
             continue
         step = 0.5 * (part - reached)
         if step < start.smallest:

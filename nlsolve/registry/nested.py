@@ -18,12 +18,8 @@ from nlsolve.registry.registry import load_registry
 def installed(contract: type[Component]) -> BeforeValidator:
     """A table with a kind -> the installed component of this contract; what is wrong is told in its own place."""
 
-    def component(value: Any) -> Any:
-        registry = load_registry()
-        known = registry.known(contract.noun, value)
-        return (
-            registry.classes(contract.noun)[known["kind"]].model_validate(known) if isinstance(known, dict) else known
-        )
+    def component(value: Any) -> Component:
+        return load_registry().component(contract.noun, value)
 
     return BeforeValidator(component)
 

@@ -10,6 +10,8 @@ from typing import Any, get_args
 from pydantic import BaseModel, ValidationError
 
 from nlsolve.contracts.component import Component
+from nlsolve.contracts.status import InputError
+from nlsolve.registry.component_tables import ComponentTable
 from nlsolve.registry.registry import CONTRACTS, load_registry
 from nlsolve.registry.toml_lines import Place, nearest_line
 
@@ -39,7 +41,7 @@ MOVED: dict[str, str] = {
 """Dotted places of sections and fields of older study files, and what these are called now."""
 
 
-class StudyError(ValueError):
+class StudyError(InputError):
     """A study that cannot be run as it is written. The message has one sentence, on its own line, for every problem."""
 
     def __init__(self, *problems: str) -> None:
@@ -58,7 +60,7 @@ class Problem:
     def sentence(self, source: Source) -> str:
         """The problem for people, beginning with the place to look at."""
         text = repr(self.value)
-        shown = f" = {text}" if self.value is not ABSENT and len(text) <= LONGEST_VALUE else ""
+        shown = f" = {text}" if self.value is not ABSENT and len(text) <= LONGEST_VALUE and "\n" not in text else ""
         return f"{source.of(self.place)}: {dotted(self.place)}{shown}: {self.expected}"
 
 
@@ -186,7 +188,9 @@ def _fields_at(model: type[BaseModel], place: Place, document: Any) -> list[str]
 
 
 def _chosen(candidates: list[type[BaseModel]], document: Any) -> type[BaseModel]:
-    """Of several models, the one whose `kind` the document names."""
+    """Of several models, the one whose `kind` the document names; or the class that a table was made from."""
+    if isinstance(document, ComponentTable):
+        return document.cls
     for candidate in candidates:
         info = candidate.model_fields.get("kind")
         if (

@@ -15,7 +15,7 @@ from importlib.metadata import EntryPoint, entry_points
 from typing import Annotated, Any, Union, get_args
 
 import pluggy
-from pydantic import BeforeValidator, Field
+from pydantic import PlainValidator, SerializeAsAny
 from pydantic.fields import FieldInfo
 from pydantic_core import PydanticCustomError, to_jsonable_python
 
@@ -29,6 +29,7 @@ from nlsolve.contracts.rules.predictor import Predictor
 from nlsolve.contracts.rules.refresh import RefreshRule
 from nlsolve.contracts.scene import Scene
 from nlsolve.registry import hookspecs
+from nlsolve.registry.component_tables import ComponentTable, own_class
 
 CONTRACTS: dict[str, type[Component]] = {
     contract.noun: contract
@@ -147,11 +148,18 @@ class Registry:
         return f"no such {noun}; {guess}installed: {', '.join(classes) or 'none'}{failed}"
 
     def known(self, noun: str, value: object) -> object:
-        """A component, or a table with an installed kind, as it is; PydanticCustomError for anything else."""
-        if isinstance(value, Component):
+        """A component of this noun, or a table of one, as it is; PydanticCustomError for anything else."""
+        if isinstance(value, Component | ComponentTable):
+            self._check_class(noun, value.cls if isinstance(value, ComponentTable) else type(value))
+        if isinstance(value, Component) or own_class(value) is not None:
             return value
+        if isinstance(value, type) and issubclass(value, Component):
+            message = "{name} is a class: give an instance of it, such as {name}()"
+            raise PydanticCustomError("instance_expected", message, {"name": value.__name__})
         if not isinstance(value, Mapping):
-            raise PydanticCustomError("table_expected", 'should be a table with a kind, like { kind = "…" }')
+            raise PydanticCustomError(
+                "table_expected", 'should be a table with a kind, like { kind = "…" }, or an instance'
+            )
         if "kind" not in value:
             kinds = ", ".join(self.classes(noun)) or "none"
             raise PydanticCustomError("kind_missing", "required, and missing; installed: {kinds}", {"kinds": kinds})
@@ -160,16 +168,50 @@ class Registry:
             raise PydanticCustomError("kind_unknown", "{complaint}", {"complaint": complaint})
         return value
 
+    def _check_class(self, noun: str, cls: type[Component]) -> None:
+        """PydanticCustomError for a class of another contract, or without a kind."""
+        told = {"name": cls.__name__, "given": cls.noun, "noun": noun, "kinds": ", ".join(self.classes(noun)) or "none"}
+        if not issubclass(cls, CONTRACTS[noun]):
+            message = "{name} is a {given}, where a {noun} belongs; installed: {kinds}"
+            raise PydanticCustomError("contract_wrong", message, told)
+        try:
+            cls.kind_name()
+        except TypeError as error:
+            raise PydanticCustomError("kind_undeclared", "{reason}", {"reason": str(error)}) from error
+
+    def class_of(self, noun: str, value: object) -> type[Component] | None:
+        """The class that a component is of, or a table names; None where there is none of that name."""
+        if isinstance(value, Component):
+            return type(value)
+        if (own := own_class(value)) is not None:
+            return own
+        kind = value.get("kind") if isinstance(value, Mapping) else None
+        return self.classes(noun).get(kind) if isinstance(kind, str) else None
+
+    def component(self, noun: str, value: object) -> Component:
+        """A component as it is; a table as an instance of the class it names. Installed or not: any class will do.
+
+        Raises PydanticCustomError where there is no such class, ValidationError where a field is wrong.
+        """
+        known = self.known(noun, value)
+        if isinstance(known, Component):
+            return known
+        cls = self.class_of(noun, known)
+        assert cls is not None  # or it would not be known
+        return cls.model_validate(known)
+
+    def is_installed(self, component: Component) -> bool:
+        """Whether its noun and kind name this very class."""
+        return self.classes(component.noun).get(component.kind_name()) is type(component)
+
     def union(self, noun: str) -> Any:
-        """The pydantic type of a section: one of the installed classes, discriminated on `kind`."""
+        """The pydantic type of a section: an instance of any class of this noun, or a table of an installed one."""
 
-        def known(value: object) -> object:
-            return self.known(noun, value)
+        def component(value: object) -> Component:
+            return self.component(noun, value)
 
-        members = tuple(self.classes(noun).values())
-        if len(members) > 1:
-            return Annotated[Union[members], Field(discriminator="kind"), BeforeValidator(known)]  # noqa: UP007
-        return Annotated[members[0] if members else Component, BeforeValidator(known)]
+        members = tuple(self.classes(noun).values()) or (Component,)
+        return Annotated[Union[members], PlainValidator(component), SerializeAsAny()]  # noqa: UP007
 
     def plugins(self) -> list[PluginRow]:
         """A row for every offered component, then a row for every plugin that failed."""

@@ -7,6 +7,8 @@ from typing import Any
 
 import pandas as pd
 
+from nlsolve.contracts.component import Component
+from nlsolve.registry.component_tables import class_name
 from nlsolve.running.timing import calibrate
 from nlsolve.solving.ledger import Ledger
 from nlsolve.study.study import Study
@@ -46,7 +48,7 @@ def forecast(study: Study) -> pd.DataFrame:
     measured: dict[str, dict[str, Any]] = {}
     rows = []
     for case in study.cases:
-        key = case.parts.model_dump_json(exclude=set(METHOD))
+        key = "".join(_identity(part) for name, part in case.parts if name not in METHOD)
         if key not in measured:
             measured[key] = costs_of(case.parts)
         costs, work = measured[key], case.parts.scene.simulation(case.parts, Ledger().entry).workload()
@@ -58,6 +60,10 @@ def forecast(study: Study) -> pd.DataFrame:
         swept = {name: case.parameters[name] for name in case.swept}
         rows.append({"case": case.id, **swept, "increments": work.increments, **costs, **seconds})
     return pd.DataFrame(rows)
+
+
+def _identity(part: Component | None) -> str:
+    return "" if part is None else class_name(type(part)) + part.model_dump_json()
 
 
 def costs_of(parts: Any) -> dict[str, Any]:

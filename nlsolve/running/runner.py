@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import time
-import traceback
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -24,7 +23,7 @@ from nlsolve.running.timing import CLOCKS, measure
 from nlsolve.show.figures import FigureError, draw, save
 from nlsolve.show.report import write_report
 from nlsolve.show.tables import Table, build
-from nlsolve.solving.simulate import Progress, Record, run_case
+from nlsolve.solving.simulate import Progress, Record, crashed, run_case
 from nlsolve.study.case import Case
 from nlsolve.study.study import Study
 from nlsolve.study.timing import Timing
@@ -78,7 +77,7 @@ class Results:
         return _tables(self.study, self.runs)[0]
 
     def table(self, name: str) -> pd.DataFrame:
-        """The cells of a declared table."""
+        """The cells of a declared table. Raises StudyError where none has this name."""
         for spec in self.study.tables:
             if spec.name == name:
                 return build(spec, self.runs).cells
@@ -97,7 +96,10 @@ def run(
     """Run every case of a study that has not been run before, and keep the results in `out` (None: in memory).
 
     An interruption loses the running case only; the same call again does the rest. Cases that crashed, or whose method
-    did not apply, are tried again.
+    did not apply, are tried again. `listen` is told of each `Event`.
+
+    Raises StudyError for a study that cannot be run as it is written, StoreError for a folder that cannot hold its
+    results.
     """
     study = _study(study, overrides, quick)
     store = None if out is None else Store(Path(out), study)
@@ -140,9 +142,7 @@ def execute(case: Case, number: int, cases: int, tell: Listener, timing: Timing)
             record = run_case(case.parts, listen, clock)
             units = unit_costs(record, case.parts.linear, clock) if timing.calibrate else {}
     except Exception as error:  # the one boundary at which a crash turns into a result
-        place = traceback.extract_tb(error.__traceback__)[-1]
-        message = f"{type(error).__name__}: {error} ({place.filename}:{place.lineno})"
-        summary: dict[str, Any] = {"status": Status.CRASHED.word, "message": message}
+        summary: dict[str, Any] = crashed(error)
         steps = fields = pd.DataFrame()
     else:
         timed = {"rounds": 1, "seconds_most": record.summary.get("seconds"), "clock": timing.clock}

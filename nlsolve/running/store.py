@@ -14,7 +14,7 @@ import pandas as pd
 from pandas.api.types import is_object_dtype
 from pyarrow import ArrowException
 
-from nlsolve.contracts.status import Status
+from nlsolve.contracts.status import InputError, Status
 from nlsolve.results.columns import FIELDS, RUNS, STEPS
 from nlsolve.results.frames import Frames, Row, rows_of
 from nlsolve.results.verdicts import status_of
@@ -28,7 +28,7 @@ TRIED_AGAIN = frozenset({Status.CRASHED, Status.NOT_APPLICABLE})
 """A case that ended so is run again: what it lacked may have been installed since."""
 
 
-class StoreError(ValueError):
+class StoreError(InputError):
     """A results folder cannot be used; the sentence says why, and what to do."""
 
 

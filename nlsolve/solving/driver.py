@@ -36,7 +36,7 @@ def solve(
 
     After every step ‖R_new‖/‖R_old‖ is measured here, for the table of steps and for the refresh rule of `tangent`.
     """
-    counted = CountedProblem(problem, ledger)
+    counted, begun, renewals = CountedProblem(problem, ledger), ledger.copy(), tangent.renewals
     scale = counted.uncounted_scale(start)
     before, rows = start, list[dict[str, Any]]()
     residual_norm = size = np.inf
@@ -46,8 +46,19 @@ def solve(
         blame: Mapping[str, float] = {}
         if status is not Status.CONVERGED and np.isfinite(before).all():
             blame = problem.blame(before, counted.uncounted_residual(before))
-        sentence = detail or status.sentence
-        return Outcome(status, sentence, before, float(residual_norm), tuple(rows), claimed, denied, blame)
+        spent = ledger.since(begun)
+        return Outcome(
+            status,
+            detail or status.sentence,
+            before,
+            float(residual_norm),
+            tuple(rows),
+            claimed,
+            denied,
+            blame,
+            {"tangents": tangent.renewals - renewals, **spent.counted()},
+            spent.timed(),
+        )
 
     if not np.isfinite(scale):
         return ended(

@@ -12,6 +12,18 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 
+COUNTED = {
+    "factorizations": "factorization",
+    "triangular_solves": "triangular_solve",
+    "jacobians": "jacobian",
+    "residuals": "residual",
+    "series_orders": "series_order",
+}
+"""Columns of `nlsolve.results.columns.RUNS`, and the kinds of work that they count."""
+
+COUNTED_BESIDES = {"expansions": "expansion", "series_terms": "series_term", "matrix_products": "matrix_product"}
+"""The same of what a cost model wants to know besides."""
+
 KINDS = ("residual", "jacobian", "matrix_product", "factorization", "triangular_solve", "series_order")
 
 
@@ -40,18 +52,13 @@ class Ledger:
     def work(self) -> dict[str, float]:
         """What a method has asked for, and the seconds it took, under the names of `nlsolve.results.columns.RUNS`."""
         return {
-            "factorizations": self.counts["factorization"],
-            "triangular_solves": self.counts["triangular_solve"],
-            "jacobians": self.counts["jacobian"],
-            "residuals": self.counts["residual"],
-            "series_orders": self.counts["series_order"],
+            **{column: self.counts[kind] for column, kind in COUNTED.items()},
             "seconds": self.seconds["method"],
             "seconds_factorization": self.seconds["factorization"],
             "seconds_triangular_solve": self.seconds["triangular_solve"],
             "seconds_jacobian": self.seconds["jacobian"],
             "seconds_residual": self.seconds["residual"],
             "seconds_series": self.seconds["series_order"],
-            "seconds_operators": self.seconds["operators"],
             **self.details(),
             "factor_solve_ratio": self.each("factorization") / self.each("triangular_solve"),
         }
@@ -64,8 +71,25 @@ class Ledger:
         """What a cost model wants to know besides the counts and seconds by kind, by the names of columns."""
         asked_for = sum(self.seconds[kind] for kind in KINDS)
         return {
-            "expansions": self.counts["expansion"],
-            "series_terms": self.counts["series_term"],
-            "matrix_products": self.counts["matrix_product"],
+            **{column: self.counts[kind] for column, kind in COUNTED_BESIDES.items()},
             "seconds_own": self.seconds["method"] - asked_for,
         }
+
+    def copy(self) -> Ledger:
+        """The books as they are now."""
+        return Ledger(self.clock, self.counts.copy(), self.seconds.copy())
+
+    def since(self, before: Ledger) -> Ledger:
+        """What has been entered since `before`, a copy of these books, was made."""
+        spent = self.copy()
+        spent.counts.subtract(before.counts)
+        spent.seconds.subtract(before.seconds)
+        return spent
+
+    def counted(self) -> dict[str, int]:
+        """How often each kind of work was done, by the names of columns."""
+        return {column: self.counts[kind] for column, kind in (COUNTED | COUNTED_BESIDES).items()}
+
+    def timed(self) -> dict[str, float]:
+        """Seconds by kind of work, "own" for what a method did by itself; together the seconds inside the method."""
+        return {kind: self.seconds[kind] for kind in KINDS} | {"own": self.details()["seconds_own"]}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+import traceback
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Protocol
@@ -15,7 +16,7 @@ from nlsolve.contracts.nonlinear_solver import NonlinearSolver
 from nlsolve.contracts.outcome import Outcome
 from nlsolve.contracts.problem import NonlinearProblem
 from nlsolve.contracts.rules.refresh import RefreshRule
-from nlsolve.contracts.scene import Scene, Solve
+from nlsolve.contracts.scene import Entry, Simulation, Solve
 from nlsolve.contracts.status import SolveError, Status
 from nlsolve.results.columns import REPORTED, run_columns
 from nlsolve.results.frames import steps_frame
@@ -26,11 +27,9 @@ from nlsolve.solving.stopping import Budget, StoppingTest
 from nlsolve.solving.tangent import Tangent
 
 
-class Parts(Protocol):
-    """The components of a case by the names of their sections: those of every case; a scene asks for more."""
+class Method(Protocol):
+    """The components of every case: what solves its problems, and when that stops."""
 
-    @property
-    def scene(self) -> Scene: ...
     @property
     def linear(self) -> LinearSolver: ...
     @property
@@ -57,35 +56,57 @@ class Progress:
 class Record:
     """What one case leaves: its row of `runs`, its rows of `steps`, its `fields` (a row a node and recorded time).
 
+    outcome : how the case ended; of a single solve, all there is to say of it.
     problem, state : the last that was solved, None before the first; for measuring what work on them costs.
     """
 
     summary: dict[str, Any]
+    outcome: Outcome
     steps: pd.DataFrame
     fields: pd.DataFrame = field(default_factory=pd.DataFrame)
     problem: NonlinearProblem | None = None
     state: Array | None = None
 
 
-@np.errstate(all="ignore")  # what is not finite becomes a status, a doubt or a NaN
 def run_case(
-    parts: Parts,
+    parts: Any,
     listen: Callable[[Progress], None] | None = None,
     clock: Callable[[], float] = time.process_time,
 ) -> Record:
-    """Run one case; every ending, failure included, is in the record. `clock` is what its seconds are told by."""
-    return _Run(parts, listen or (lambda progress: None), clock).record()
+    """Run the case of these components, by the names of their sections, `scene` among them; see `simulate`."""
+    return simulate(lambda entry: parts.scene.simulation(parts, entry), parts, listen, clock)
+
+
+@np.errstate(all="ignore")  # what is not finite becomes a status, a doubt or a NaN
+def simulate(
+    build: Callable[[Entry], Simulation],
+    method: Method,
+    listen: Callable[[Progress], None] | None = None,
+    clock: Callable[[], float] = time.process_time,
+) -> Record:
+    """Solve the problems of a simulation; every ending, failure included, is in the record.
+
+    build : makes the simulation, whose work outside the method is entered in the books it is handed.
+    clock : what seconds are told by.
+    """
+    return _Run(build, method, listen or (lambda progress: None), clock).record()
 
 
 class _Run:
     """One case on its way: its simulation, the books of its own solves, and those of the way to the first state."""
 
-    def __init__(self, parts: Parts, listen: Callable[[Progress], None], clock: Callable[[], float]) -> None:
-        self.parts, self.listen = parts, listen
+    def __init__(
+        self,
+        build: Callable[[Entry], Simulation],
+        method: Method,
+        listen: Callable[[Progress], None],
+        clock: Callable[[], float],
+    ) -> None:
+        self.method, self.listen = method, listen
         self.ledger, self.start_ledger = Ledger(clock), Ledger(clock)
-        self.tangent = Tangent(parts.linear, parts.refresh, self.ledger)
-        self.start_tangent = Tangent(parts.linear, None, self.start_ledger)
-        self.simulation = parts.scene.simulation(parts, self.ledger.entry)
+        self.tangent = Tangent(method.linear, method.refresh, self.ledger)
+        self.start_tangent = Tangent(method.linear, None, self.start_ledger)
+        self.simulation = build(self.ledger.entry)
         self.rows: list[dict[str, Any]] = []
         self.increments = self.iterations = 0
         self.time = 0.0
@@ -99,7 +120,7 @@ class _Run:
         outcome = self.outcome()
         summary = self.summary(outcome)
         problem, state = self.kept or (None, None)
-        return Record(summary, steps_frame(self.rows), self.simulation.fields(), problem, state)
+        return Record(summary, outcome, steps_frame(self.rows), self.simulation.fields(), problem, state)
 
     def outcome(self) -> Outcome:
         """Solve the problems of the simulation one after the other; how the case ended."""
@@ -131,15 +152,15 @@ class _Run:
 
     def solved(self, task: Solve) -> Outcome:
         """The case's own method on one problem; its rows, counts and largest residual are kept."""
-        parts, k = self.parts, task.increment
+        method, k = self.method, task.increment
         if not self.tangent.renewals:  # in the ordering that the way to the first state settled on
-            self.tangent = Tangent(parts.linear, parts.refresh, self.ledger, self.start_tangent.factors)
-        outcome = solve(task.problem, parts.solver, self.tangent, task.start, parts.stop, parts.budget, self.ledger)
-        self.iterations += max(0, len(outcome.steps) - 1)
+            self.tangent = Tangent(method.linear, method.refresh, self.ledger, self.start_tangent.factors)
+        outcome = solve(task.problem, method.solver, self.tangent, task.start, method.stop, method.budget, self.ledger)
+        self.iterations += outcome.iterations
         self.false_convergence += outcome.claimed_wrongly
         self.false_failure += outcome.denied_wrongly
         self.blame = outcome.blame
-        self.rows += [{"increment": k, "time": task.time, "accepted": False, **row} for row in outcome.steps]
+        self.rows += [{"increment": k, "time": task.time, "accepted": False, **row} for row in outcome.rows]
         if self.validity_time is None and self.simulation.increments and self.tangent.renewals > 1:
             self.validity_time = self.time
         before = self.residual_norm if k else np.nan  # of a steady state the last solve counts: a start may repeat it
@@ -160,9 +181,7 @@ class _Run:
 
     def summary(self, outcome: Outcome) -> dict[str, Any]:
         """The row of the case; what the simulation measures is of the last state that was kept."""
-        ledger, start, status = self.ledger, self.start_ledger, outcome.status
-        plain = outcome.detail in ("", status.sentence) or status is Status.CONVERGED
-        said = status.sentence if plain else f"{status.sentence}; {outcome.detail}"
+        ledger, start = self.ledger, self.start_ledger
         place = self.simulation.place(self.blame)
         validity = self.validity_time
         if validity is None and self.simulation.increments and self.increments:
@@ -174,8 +193,8 @@ class _Run:
             "seconds_start": start.seconds["stage"],
         }
         return {
-            "status": status.word,
-            "message": "; ".join(filter(None, (said, place))),
+            "status": outcome.status.word,
+            "message": "; ".join(filter(None, (outcome.message, place))),
             "false_convergence": self.false_convergence,
             "false_failure": self.false_failure,
             **self.blame,
@@ -186,11 +205,19 @@ class _Run:
             **ledger.work(),
             **reported(self.rows),
             **(preparation if self.simulation.prepares else {}),
+            "seconds_operators": ledger.seconds["operators"],
             "seconds_all": ledger.seconds["method"] + ledger.seconds["operators"] + start.seconds["stage"],
             **self.tangent.facts(),
             "residual_norm": self.residual_norm,
             **run_columns({**self.simulation.sizes, **self.simulation.measured(outcome)}),
         }
+
+
+def crashed(error: Exception) -> dict[str, Any]:
+    """The row of a case that ended in an error of the program or of a plugin: what it said, and where."""
+    place = traceback.extract_tb(error.__traceback__)[-1]
+    message = f"{type(error).__name__}: {error} ({place.filename}:{place.lineno})"
+    return {"status": Status.CRASHED.word, "message": message}
 
 
 def reported(rows: Sequence[Mapping[str, Any]]) -> dict[str, float | None]:

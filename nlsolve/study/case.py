@@ -4,17 +4,19 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 from pydantic import BaseModel, ConfigDict, ValidationError, create_model
+from pydantic_core import PydanticSerializationError, to_jsonable_python
 
 from nlsolve.contracts.component import Component
 from nlsolve.contracts.linear_solver import LinearSolver
 from nlsolve.contracts.nonlinear_solver import NonlinearSolver
 from nlsolve.contracts.rules.refresh import RefreshRule
 from nlsolve.contracts.scene import Misfit, Scene, Section
+from nlsolve.registry.component_tables import ComponentTable, class_name
 from nlsolve.registry.problems import ABSENT, Problem, problems_in, unknown
 from nlsolve.registry.registry import CONTRACTS, Registry
 from nlsolve.results.parameters import names_settings
@@ -68,34 +70,33 @@ class Invalid(Exception):
 
 
 class Composer:
-    """Makes cases of what is installed."""
+    """Makes cases of what is installed, and of the scenes that a document brings as instances."""
 
-    def __init__(self, registry: Registry) -> None:
+    def __init__(self, registry: Registry, document: Document) -> None:
         self.registry = registry
         self._models: dict[type[Component], type[BaseModel]] = {}
         self._all: dict[str, Section] = {}
-        for scene in registry.classes(Scene.noun).values():
+        for scene in (*registry.classes(Scene.noun).values(), *classes_in(document)):
             if issubclass(scene, Scene):
                 self._all |= sections_of(scene)
         self._all |= COMMON
 
     @property
     def sections(self) -> tuple[str, ...]:
-        """The parts of a study that cases are made of, and that can be swept: of all scenes that are installed."""
+        """The parts of a study that cases are made of, and that can be swept: of all scenes there are."""
         return (Scene.noun, *self._all)
 
     def case(self, document: Document, points: Sequence[Point]) -> Case:
         """The case of a document that the points of its sweeps have been assigned to. Raises Invalid."""
         parts: Any = self.parts(document)
-        if parts.stop.kind == "claim" and not parts.solver.claims:
-            sentence = f"the solver {parts.solver.kind_name()!r} never claims a solution; use residual or difference"
-            raise Invalid([Problem(("stop", "kind"), "claim", sentence)])
+        if unclaimed := claims_missing(parts.solver, parts.stop):
+            raise Invalid(unclaimed)
         try:
             parts.scene.check(parts)
         except Misfit as misfit:
             value = getattr(getattr(parts, misfit.section), misfit.field)
             raise Invalid([Problem((misfit.section, misfit.field), _plain(value), misfit.expected)]) from misfit
-        plain = json.loads(parts.model_dump_json())
+        plain = self.plain(parts)
         canonical = json.dumps(plain, sort_keys=True, separators=(",", ":"))
         digest = hashlib.sha256(canonical.encode()).hexdigest()[:DIGEST_LETTERS]
         chosen = {name: section for name, section in plain.items() if section is not None}  # None: left out on purpose
@@ -107,10 +108,9 @@ class Composer:
         sections = sections_of(scene) if issubclass(scene, Scene) else self._all
         needless = [name for name in document if name not in (Scene.noun, *sections)]
         if needless:
-            sentence = f"the scene {scene.kind_name()!r} has no such section: leave it out"
             raise Invalid(
                 [
-                    Problem((name,), ABSENT, sentence)
+                    Problem((name,), ABSENT, f"the scene {scene.kind_name()!r} has no such section: leave it out")
                     if name in self._all
                     else unknown((name,), ABSENT, "no such section", self.sections)
                     for name in needless
@@ -137,19 +137,52 @@ class Composer:
             for name, section in sections.items():
                 if CONTRACTS.get(section.contract.noun) is section.contract:
                     fields[name] = (self.registry.union(section.contract.noun), None if section.of else ...)
+                elif any(field.is_required() for field in section.contract.model_fields.values()):
+                    fields[name] = (section.contract, ...)
                 else:
                     fields[name] = (section.contract, section.contract())
             config = ConfigDict(extra="forbid", frozen=True)
             self._models[scene] = create_model("Parts", __config__=config, **fields)
         return self._models[scene]
 
+    def plain(self, parts: BaseModel) -> dict[str, Any]:
+        """The sections as JSON has them. A component that is not of the installed class of its kind has its `class`
+        beside it, so that cases of two classes differ.
+        """
+        try:
+            plain = json.loads(parts.model_dump_json())
+        except PydanticSerializationError as error:
+            sentence = f"a field cannot be written as JSON, by which cases are told apart: {error}"
+            raise Invalid([Problem((name,), ABSENT, sentence) for name in unwritable(parts)]) from error
+        for name in plain:
+            self._add_class(plain[name], getattr(parts, name))
+        return plain
+
+    def _add_class(self, plain: Any, value: object) -> None:
+        if not isinstance(value, Component):
+            return
+        for name in type(value).model_fields:
+            self._add_class(plain.get(name), getattr(value, name))
+        if value.noun in CONTRACTS and not self.registry.is_installed(value):
+            plain["class"] = class_name(type(value))
+
     def named(self, document: Document, section: str, contract: type[Component]) -> type[Component]:
-        """The installed class that a section names, or is; Component itself where there is none."""
-        given = document.get(section)
-        if isinstance(given, Component):
-            return type(given)
-        kind = given.get("kind") if isinstance(given, dict) else None
-        return self.registry.classes(contract.noun).get(kind, Component) if isinstance(kind, str) else Component
+        """The class that a section names, or is of; Component itself where there is none."""
+        return self.registry.class_of(contract.noun, document.get(section)) or Component
+
+
+def classes_in(document: Any) -> Iterator[type[Component]]:
+    """The classes of all components that stand somewhere in a document as instances."""
+    if isinstance(document, ComponentTable):
+        yield document.cls
+    if isinstance(document, Component):
+        yield type(document)
+    elif isinstance(document, Mapping):
+        for value in document.values():
+            yield from classes_in(value)
+    elif isinstance(document, list | tuple):
+        for value in document:
+            yield from classes_in(value)
 
 
 def sections_of(scene: type[Scene]) -> dict[str, Section]:
@@ -164,8 +197,27 @@ def _plain(value: Any) -> Any:
 def _complete(document: Document, section: str, default: Mapping[str, Any]) -> None:
     """Give a section that names no kind its default."""
     given = document.get(section, {})
-    if isinstance(given, dict) and "kind" not in given:
+    if isinstance(given, dict) and "kind" not in given and not isinstance(given, ComponentTable):
         document[section] = {**default, **given}
+
+
+def claims_missing(solver: NonlinearSolver, stop: StoppingTest) -> list[Problem]:
+    """The problem of a stopping test that waits for a claim which the method never makes; none otherwise."""
+    if stop.kind != "claim" or solver.claims:
+        return []
+    sentence = f"the solver {solver.kind_name()!r} never claims a solution; use residual or difference"
+    return [Problem(("stop", "kind"), "claim", sentence)]
+
+
+def unwritable(composition: BaseModel) -> list[str]:
+    """The sections that JSON cannot hold."""
+    found = []
+    for name in type(composition).model_fields:
+        try:
+            to_jsonable_python(getattr(composition, name))
+        except PydanticSerializationError:
+            found.append(name)
+    return found
 
 
 def _parameters(plain: Mapping[str, Any], points: Sequence[Point]) -> tuple[dict[str, Any], tuple[str, ...]]:

@@ -61,7 +61,10 @@ class Study:
         quick: bool = False,
         registry: Registry | None = None,
     ) -> Study:
-        """The study in a file. `overrides` are dotted names and values; `quick` applies the file's [quick] first."""
+        """The study in a file. `overrides` are dotted names and values; `quick` applies the file's [quick] first.
+
+        Raises StudyError with a sentence for each mistake: its line, its place, its value, and what is expected.
+        """
         try:
             text = Path(path).read_text(encoding="utf-8")
             document = tomllib.loads(text)
@@ -83,7 +86,10 @@ class Study:
         registry: Registry | None = None,
         name: str = "study",
     ) -> Study:
-        """The same from Python; sections may be components."""
+        """The same from Python. Sections and swept values may be components, of installed classes or of one's own.
+
+        Raises StudyError as `from_toml` does.
+        """
         return _Builder(Source(name), document, overrides or {}, quick, registry or load_registry()).study(name)
 
 
@@ -93,8 +99,8 @@ class _Builder:
     def __init__(
         self, source: Source, document: Mapping[str, Any], overrides: Mapping[str, Any], quick: bool, registry: Registry
     ) -> None:
-        self.composer = Composer(registry)
         self.document: Document = merged({}, document)
+        self.composer = Composer(registry, self.document)
         aliases = {name: source.at(place) for name, place in swept_places(self.document).items()}
         quick_values: Document = {}
         if quick:

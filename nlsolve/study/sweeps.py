@@ -12,6 +12,7 @@ from typing import Any
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from nlsolve.contracts.component import Component
+from nlsolve.registry.component_tables import ComponentTable, table_of
 from nlsolve.registry.problems import Problem, StudyError
 from nlsolve.registry.toml_lines import Place
 from nlsolve.results.aggregates import COUNT, WITHIN
@@ -137,12 +138,18 @@ def assign_all(document: Document, values: Mapping[str, Any]) -> list[Problem]:
 
 
 def merged(old: Any, new: Any) -> Any:
-    """`new` over `old`: a table with a `kind` replaces what was there, one without is merged into it."""
+    """`new` over `old`: a component, or a table with a `kind`, replaces what was there; one without is merged into it.
+
+    A component becomes a table that remembers its class, so that its fields can be set one by one.
+    """
     if isinstance(new, Component):
-        return new.model_dump()
+        new = table_of(new)
     if isinstance(new, Mapping):
-        under = old if isinstance(old, dict) and "kind" not in new else {}
-        return {**under, **{name: merged(under.get(name), value) for name, value in new.items()}}
+        whole = isinstance(new, ComponentTable) or "kind" in new
+        under = old if isinstance(old, dict) and not whole else {}
+        table = {**under, **{name: merged(under.get(name), value) for name, value in new.items()}}
+        origin = new if whole else under
+        return ComponentTable(origin.cls, table) if isinstance(origin, ComponentTable) else table
     return deepcopy(new)
 
 

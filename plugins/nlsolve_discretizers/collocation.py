@@ -108,7 +108,7 @@ class Collocation(Discretizer):
     def moved(self, operators: Operators, cloud: Cloud) -> Operators | None:
         """With the same triangles, patches and supports, unless a triangle is turned inside out."""
         near = operators.neighbours.moved_to(cloud)
-        return self._operators(near, operators.volumetric is not None) if near.triangles.upright else None
+        return self._operators(near, operators.volumetric is not None) if near.triangles.as_column else None
 
     def _operators(self, near: Neighbours, volumetric: bool) -> Operators:
         build = self._conservative if self.form == "conservative" else self._strong

@@ -34,7 +34,7 @@ class LinearTriangles(Discretizer):
     def moved(self, operators: Operators, cloud: Cloud) -> Operators | None:
         """The same triangles and patches, unless a triangle is turned inside out."""
         triangles = operators.neighbours.moved_to(cloud)
-        return _operators(triangles, operators.volumetric is not None) if triangles.upright else None
+        return _operators(triangles, operators.volumetric is not None) if triangles.as_column else None
 
     def gradient(self, cloud: Cloud) -> tuple[Any, Any]:
         """∂/∂x and ∂/∂y at the nodes: means over the triangles around each, by area."""

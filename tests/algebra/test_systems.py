@@ -20,7 +20,7 @@ from typer.testing import CliRunner
 
 import nlsolve
 from nlsolve.algebra.colouring import Compression, groups_of
-from nlsolve.algebra.root_search import Algebraic, AlgebraicSetup, displacement, root_error, solve_system
+from nlsolve.algebra.root_search import AlgebraicSetup, displacement, root_error, solve_system
 from nlsolve.cli.app import app
 from nlsolve.contracts.status import Status
 from nlsolve.plugin import NonlinearSolver, Step, System, hookimpl
@@ -236,15 +236,15 @@ def test_a_small_residual_without_a_root_is_in_doubt(system: System) -> None:
 
 
 def test_newton_steps_tell_roots_from_what_only_looks_like_them() -> None:
-    circle, far = Algebraic(Circle()), Algebraic(FarOut())
+    circle, far = Circle().equations(), FarOut().equations()
     root = np.sqrt(0.5) * np.ones(2)
     assert displacement(circle, root + 1e-6, PLAIN) < 1e-5
     assert displacement(circle, 3.0 * root, PLAIN) > 0.5
     assert displacement(far, np.array([25.0]), PLAIN) == pytest.approx(10.0 / 25.0)
     assert displacement(far, np.array([np.nan]), PLAIN) == np.inf
-    large = Algebraic(Bratu(nodes=400))
+    large = Bratu(nodes=400).equations()
     assert displacement(large, Bratu(nodes=400).roots()[0], PLAIN) < 1e-12
-    flat = Algebraic(Bratu(nodes=400, strength=0.0))
+    flat = Bratu(nodes=400, strength=0.0).equations()
     flat.jacobian = lambda u: sp.csr_array((400, 400))  # type: ignore[method-assign]
     assert displacement(flat, np.ones(400), PLAIN) == np.inf
 

@@ -7,13 +7,13 @@ from typing import Any
 
 import pytest
 from cases import PLAIN, setup
-from nlsolve.algebra.simulation import AlgebraicSetup, solve_system
 from nlsolve_rules.refresh import EveryIteration
 from nlsolve_scenes import StirringTool
 from nlsolve_scenes.nodes.rings import Rings
 from nlsolve_solvers import Newton
 from nlsolve_systems import Published
 
+from nlsolve.algebra.root_search import AlgebraicSetup, solve_system
 from nlsolve.flow.march import march
 from nlsolve.plugin import Step
 

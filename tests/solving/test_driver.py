@@ -84,21 +84,21 @@ def test_converged() -> None:
     assert outcome.status is Status.CONVERGED
     assert outcome.detail == Status.CONVERGED.sentence
     assert outcome.residual_norm <= 1e-10
-    assert [row["step"] for row in outcome.steps] == list(range(len(outcome.steps)))
+    assert [row["step"] for row in outcome.rows] == list(range(len(outcome.rows)))
     np.testing.assert_allclose(outcome.state, ToyProblem.solution, atol=1e-10)
 
 
 def test_a_start_that_is_the_solution_takes_no_step() -> None:
     outcome, ledger = run(ToyProblem(), Newton(), EveryIteration(), ToyProblem.solution.copy(), DenseLU())
     assert outcome.status is Status.CONVERGED
-    assert len(outcome.steps) == 1
+    assert len(outcome.rows) == 1
     assert ledger.counts["factorization"] == 0
 
 
 def test_budget_spent() -> None:
     outcome, ledger = run(ToyProblem(), ModifiedNewton(), Never(), START, DenseLU(), iterations=3)
     assert outcome.status is Status.BUDGET_SPENT
-    assert len(outcome.steps) == 4  # the start and three iterations
+    assert len(outcome.rows) == 4  # the start and three iterations
     assert ledger.counts["triangular_solve"] == 3
     assert 1e-10 < outcome.residual_norm < np.inf
 
@@ -107,7 +107,7 @@ def test_stagnated() -> None:
     """No new smallest residual for `PATIENCE` steps."""
     outcome, _ = run(IDENTITY, Walk(states=(0.5,), ends=False), None, ONE)
     assert outcome.status is Status.STAGNATED
-    assert len(outcome.steps) == 2 + PATIENCE
+    assert len(outcome.rows) == 2 + PATIENCE
 
 
 def test_slow_progress_is_not_stagnation() -> None:
@@ -126,7 +126,7 @@ def test_a_method_that_stops_by_itself() -> None:
 def test_diverged() -> None:
     outcome, _ = run(IDENTITY, Walk(states=(1e3, 1e7)), None, ONE)
     assert outcome.status is Status.DIVERGED
-    assert len(outcome.steps) == 3
+    assert len(outcome.rows) == 3
 
 
 def test_full_newton_steps_diverge_where_damped_ones_converge() -> None:
@@ -257,9 +257,9 @@ def test_stopping_by_difference_wants_two_steps() -> None:
     walk = Walk(states=(2.0, 2.0 + 1e-7))
     outcome, _ = run(IDENTITY, walk, None, ONE, stop=StoppingTest(kind="difference", tolerance=1e-6))
     assert outcome.status is Status.CONVERGED
-    assert len(outcome.steps) == 3
-    assert outcome.steps[-1]["difference"] == pytest.approx(0.5e-7, rel=1e-6)
-    assert np.isnan(outcome.steps[0]["difference"])
+    assert len(outcome.rows) == 3
+    assert outcome.rows[-1]["difference"] == pytest.approx(0.5e-7, rel=1e-6)
+    assert np.isnan(outcome.rows[0]["difference"])
 
 
 def test_stopping_by_claim_believes_the_method() -> None:

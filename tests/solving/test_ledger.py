@@ -33,15 +33,15 @@ def test_k_newton_iterations_cost_k_factorisations_k_solves_and_k_plus_one_resid
     flow = spin_flow(index)
     outcome, ledger = run(flow, Newton(), EveryIteration(), near(flow, 0.7))
     assert outcome.status is Status.CONVERGED
-    k = len(outcome.steps) - 1
-    assert all(step["length"] == 1.0 for step in outcome.steps[1:])  # no backtracking
+    k = len(outcome.rows) - 1
+    assert all(step["length"] == 1.0 for step in outcome.rows[1:])  # no backtracking
     assert counts(ledger) == {"residual": k + 1, "jacobian": k, "factorization": k, "triangular_solve": k}
 
 
 def test_backtracking_is_paid_in_residuals() -> None:
     flow = spin_flow(0.1324)
     outcome, ledger = run(flow, Newton(), EveryIteration(), near(flow, 1.0))
-    lengths = [step["length"] for step in outcome.steps[1:]]
+    lengths = [step["length"] for step in outcome.rows[1:]]
     assert min(lengths) < 1.0
     assert ledger.counts["residual"] >= 1 + sum(1 - int(np.log2(length)) for length in lengths)
     assert ledger.counts["factorization"] == len(lengths)
@@ -49,7 +49,7 @@ def test_backtracking_is_paid_in_residuals() -> None:
 
 def test_modified_newton_pays_one_factorisation() -> None:
     outcome, ledger = run(ToyProblem(), ModifiedNewton(), Never(), START, DenseLU())
-    k = len(outcome.steps) - 1
+    k = len(outcome.rows) - 1
     assert outcome.status is Status.CONVERGED
     assert counts(ledger) == {"residual": k + 1, "jacobian": 1, "factorization": 1, "triangular_solve": k}
 
@@ -58,7 +58,7 @@ def test_a_series_of_order_p_costs_one_residual_p_minus_one_orders_and_p_solves(
     """[G(W(a))]_p is not needed: K* W_p takes coefficients 0 … p − 1."""
     p = 12
     outcome, ledger = run(ToyProblem(), AsymptoticNumericalMethod(order=p), Never(), START, DenseLU())
-    k = len(outcome.steps) - 1
+    k = len(outcome.rows) - 1
     assert outcome.status is Status.CONVERGED
     expected = {
         "residual": k,
@@ -99,7 +99,7 @@ def test_refinement_is_counted() -> None:
     flow = spin_flow(0.5)
     start = near(flow, 0.7)
     outcome, ledger = run(flow, Newton(), EveryIteration(), start, SuperLU(ordering="mmd-ata", refinement=2))
-    k = len(outcome.steps) - 1
+    k = len(outcome.rows) - 1
     assert ledger.counts["triangular_solve"] == 3 * k
     assert ledger.counts["matrix_product"] == 2 * k
 
@@ -107,7 +107,7 @@ def test_refinement_is_counted() -> None:
 def test_trials_of_orderings_are_counted() -> None:
     flow = spin_flow(0.5)
     outcome, ledger = run(flow, Newton(), EveryIteration(), near(flow, 0.7), SuperLU(ordering="auto"))
-    k = len(outcome.steps) - 1
+    k = len(outcome.rows) - 1
     assert ledger.counts["factorization"] == k + 2  # three orderings on the first matrix
 
 
@@ -118,7 +118,7 @@ def test_the_drivers_own_residuals_are_off_the_clock() -> None:
                 yield Step(start)
 
     outcome, ledger = run(ToyProblem(), Idle(), None, START, iterations=5)
-    assert len(outcome.steps) == 6
+    assert len(outcome.rows) == 6
     assert outcome.residual_norm > 0.0
     assert counts(ledger) == {}
 

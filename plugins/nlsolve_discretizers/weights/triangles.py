@@ -53,7 +53,7 @@ class Triangles:
         return Triangles(cloud, self.corners, self.found or self)
 
     @property
-    def upright(self) -> bool:
+    def as_column(self) -> bool:
         """No triangle has been turned inside out by the motion of its nodes."""
         return bool((self.areas > 0.0).all())
 

@@ -86,7 +86,7 @@ class TestEveryone:
             run(flow, Newton(), EveryIteration(), near(flow, 0.7), each) for each in (linear, SuperLU())
         )
         assert outcome.status is Status.CONVERGED
-        assert len(outcome.steps) == len(expected.steps)
+        assert len(outcome.rows) == len(expected.rows)
         np.testing.assert_allclose(outcome.state, expected.state, rtol=0, atol=1e-8 * np.abs(expected.state).max())
 
     @pytest.mark.parametrize("linear", [Lapack(), SuperLU(), pytest.param(Rslab(), marks=needs_rslab)], ids=str)
@@ -255,7 +255,7 @@ class TestIncomplete:
     def test_every_solve_with_the_incomplete_factors_is_in_the_ledger(self, seen: Counter[str]) -> None:
         flow = spin_flow(0.5)
         outcome, ledger = run(flow, ModifiedNewton(), Never(), near(flow, 0.7), IluGmres(drop_tolerance=1e-2))
-        k = len(outcome.steps) - 1
+        k = len(outcome.rows) - 1
         assert outcome.status is Status.CONVERGED
         assert ledger.counts["factorization"] == 1
         assert ledger.counts["triangular_solve"] == seen["solves"] > 5 * k
@@ -384,5 +384,5 @@ def test_a_loose_linear_solver_is_answered_for_by_the_outside_test() -> None:
     loose, _ = run(flow, ModifiedNewton(), Never(), near(flow, 0.7), IluGmres(tolerance=0.3), stop)
     tight, _ = run(flow, ModifiedNewton(), Never(), near(flow, 0.7), IluGmres(), stop)
     assert loose.status is tight.status is Status.CONVERGED
-    assert len(loose.steps) >= len(tight.steps)
+    assert len(loose.rows) >= len(tight.rows)
     assert loose.residual_norm <= 1e-9 * flow.scale(near(flow, 0.7))

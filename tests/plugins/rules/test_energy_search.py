@@ -114,8 +114,8 @@ def test_a_step_that_ends_before_the_least_energy_is_taken_in_full() -> None:
     """On a quadratic potential, n = 1, the full step is the solution."""
     flow, rest = at_rest(1.0)
     outcome, _ = run(flow, ENERGY, None, rest)
-    assert len(outcome.steps) == 2
-    assert outcome.steps[1]["length"] == 1.0
+    assert len(outcome.rows) == 2
+    assert outcome.rows[1]["length"] == 1.0
 
 
 @pytest.mark.parametrize("index", [0.3, 0.1324])
@@ -128,7 +128,7 @@ def test_lengths_end_where_the_slope_is_all_but_gone(index: float) -> None:
         assert before < 0.0
         assert after <= 0.1 * abs(before) * (1.0 + 1e-9)
     outcome, _ = run(flow, ENERGY, None, scrambled(rest))
-    lengths = [row["length"] for row in outcome.steps[1:]]
+    lengths = [row["length"] for row in outcome.rows[1:]]
     assert outcome.status is Status.CONVERGED
     assert 0.0 < min(lengths) < 0.5
     assert lengths[-1] == 1.0
@@ -149,7 +149,7 @@ def test_a_search_cut_short_takes_the_length_it_tried_last(trials: int) -> None:
     sizes = [float(np.linalg.norm(flow.residual(u))) for u in found]
     outcome, _ = run(flow, ENERGY.with_(globalization=Energy(trials=trials)), None, scrambled(rest), iterations=5)
     for i in range(1, 5):
-        assert outcome.steps[i]["contraction"] == pytest.approx(sizes[i] / sizes[i - 1], rel=1e-10)
+        assert outcome.rows[i]["contraction"] == pytest.approx(sizes[i] / sizes[i - 1], rel=1e-10)
 
 
 # A kept tangent.
@@ -162,7 +162,7 @@ def test_modified_newton_with_the_energy_search(index: float) -> None:
     expected = run(flow, Newton(), None, run(flow, ENERGY, None, rest)[0].state, stop=TIGHT)[0].state
     outcome, ledger = run(flow, ModifiedNewton(globalization=Energy()), PoorContraction(), start, stop=TIGHT)
     assert outcome.status is Status.CONVERGED, outcome.detail
-    assert ledger.counts["factorization"] < len(outcome.steps) - 1
+    assert ledger.counts["factorization"] < len(outcome.rows) - 1
     np.testing.assert_allclose(outcome.state, expected, rtol=0.0, atol=1e-8 * np.abs(expected).max())
 
 

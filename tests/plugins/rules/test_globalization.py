@@ -152,9 +152,9 @@ def test_what_a_search_tries_is_in_the_ledger(solver: Any) -> None:
         ledger,
     )
     assert outcome.status is Status.CONVERGED
-    lengths = [row["length"] for row in outcome.steps[1:]]
+    lengths = [row["length"] for row in outcome.rows[1:]]
     assert min(lengths) < 1.0
-    assert ledger.counts["residual"] >= len(outcome.steps) + sum(length < 1.0 for length in lengths)
+    assert ledger.counts["residual"] >= len(outcome.rows) + sum(length < 1.0 for length in lengths)
 
 
 class Halfway(Globalization):
@@ -207,7 +207,7 @@ def test_a_strangers_globalization_is_taken(monkeypatch: pytest.MonkeyPatch) -> 
     monkeypatch.setattr(nested, "load_registry", lambda: registry)
     solver = Newton.model_validate({"globalization": {"kind": "halfway"}})
     outcome, _ = run(ToyProblem(), solver, EveryIteration(), ToyProblem.solution + 0.5, DenseLU())
-    assert {row["length"] for row in outcome.steps[1:]} == {0.5}
+    assert {row["length"] for row in outcome.rows[1:]} == {0.5}
     assert solver.model_dump() == {"kind": "newton", "globalization": {"kind": "halfway"}}
 
 

@@ -66,7 +66,7 @@ PEERS = [
 
 def reported(outcome: Outcome, name: str) -> float:
     """What all steps say together."""
-    return sum(step[name] for step in outcome.steps if name in step)
+    return sum(step[name] for step in outcome.rows if name in step)
 
 
 # Where a library is absent.
@@ -107,7 +107,7 @@ def test_scipy_reports_the_residuals_that_were_observed(method: Any) -> None:
     flow = spin_flow(0.5)
     outcome, ledger = run(flow, ScipyRoot(method=method), PoorContraction(), near(flow, 0.52), stop=STOP)
     assert outcome.status is Status.CONVERGED
-    assert len(outcome.steps) == 2
+    assert len(outcome.rows) == 2
     assert reported(outcome, "reported_residuals") == ledger.counts["residual"] > 0
 
 
@@ -168,8 +168,8 @@ def test_a_peer_reports_what_was_observed_with_a_new_tangent_each_time(solver: A
     flow = spin_flow(0.5)
     outcome, ledger = run(flow, solver, EveryIteration(), near(flow, 0.52), stop=STOP)
     assert outcome.status is Status.CONVERGED, outcome.detail
-    assert len(outcome.steps) == 2
-    said = [name for name in OBSERVED if name in outcome.steps[1]]
+    assert len(outcome.rows) == 2
+    said = [name for name in OBSERVED if name in outcome.rows[1]]
     assert "reported_residuals" in said
     for name in said:
         observed = ledger.counts[OBSERVED[name]]
@@ -248,7 +248,7 @@ def test_an_inexact_newton_needs_as_many_iterations_as_ours(theirs: NonlinearSol
     flow = spin_flow(0.5)
     ours, _ = run(flow, NewtonKrylov(products="jacobian"), Never(), near(flow, 0.52), stop=STOP)
     outcome, ledger = run(flow, theirs, Never(), near(flow, 0.52), stop=STOP)
-    assert abs(reported(outcome, "reported_iterations") - (len(ours.steps) - 1)) <= 1
+    assert abs(reported(outcome, "reported_iterations") - (len(ours.rows) - 1)) <= 1
     assert ledger.counts["factorization"] == 1
     assert ledger.counts["matrix_product"] >= ledger.counts["triangular_solve"]
 

@@ -75,7 +75,7 @@ def test_the_last_terms_tell_the_nearest_singularity(c: float) -> None:
 
 def test_a_linear_problem_has_no_singularity() -> None:
     outcome, _ = run(LinearProblem(), Method(), RangeUnderOne(), np.zeros(3), DenseLU())
-    assert outcome.steps[-1]["singularity"] == np.inf
+    assert outcome.rows[-1]["singularity"] == np.inf
 
 
 class LinearProblem(SquareRoot):
@@ -310,7 +310,7 @@ def test_an_adaptive_series_stops_at_its_range_and_not_before_the_third_order() 
         solver = Method(adaptive=True, tolerance=tolerance, range="residual-coefficient")
         outcome, ledger = run(flow, solver, EveryIteration(), near(flow, 0.5001), stop=stop)
         counts.append(ledger.counts["triangular_solve"])
-        assert outcome.steps[-1]["range"] >= 1.0
+        assert outcome.rows[-1]["range"] >= 1.0
     assert counts[0] == 3
     assert counts == sorted(counts)
     assert counts[-1] < 20
@@ -321,7 +321,7 @@ def test_corrections_are_newton_steps_with_the_kept_tangent() -> None:
     start = near(flow, 0.502)
     plain, _ = run(flow, Method(order=3, tolerance=1e9), Never(), start, iterations=1)
     corrected, ledger = run(flow, Method(order=3, tolerance=1e9, corrections=2), Never(), start, iterations=3)
-    states = [row["residual_norm"] for row in corrected.steps]
+    states = [row["residual_norm"] for row in corrected.rows]
     assert states[1] == plain.residual_norm
     assert states[3] < states[2] < states[1]
     assert ledger.counts["triangular_solve"] == 3 + 2
@@ -355,14 +355,14 @@ def limits(solver: Method, start: Array, rule: Any = None, problem: NonlinearPro
     """`limited_by` of the branches that were used."""
     outcome, _ = run(problem, solver, rule or EveryIteration(), start, DenseLU(), stop=StoppingTest(tolerance=1e-9))
     assert outcome.status is Status.CONVERGED, outcome.detail
-    return [row["limited_by"] for row in outcome.steps[1:] if "limited_by" in row]
+    return [row["limited_by"] for row in outcome.rows[1:] if "limited_by" in row]
 
 
 @pytest.mark.parametrize("rule", RULES)
 def test_a_branch_names_the_rule_that_limited_it_or_the_end_of_its_path(rule: Any) -> None:
     solver = Method(order=5, tolerance=1e-5, range=rule)
     outcome, _ = run(SMALL, solver, EveryIteration(), START - 1.5, DenseLU(), stop=StoppingTest(tolerance=1e-9))
-    named = {(row["limited_by"], row["range"] >= 1.0) for row in outcome.steps[1:]}
+    named = {(row["limited_by"], row["range"] >= 1.0) for row in outcome.rows[1:]}
     assert named == {(rule, False), ("end of path", True)}
 
 
@@ -427,10 +427,10 @@ def test_a_path_ends_at_the_residual_wanted(form: Any, wanted: float) -> None:
         solver = Method(form=form, order=60, adaptive=True, range="true-residual", residual=wanted)
         outcome, _ = run(flow, solver, RangeUnderOne(), near(flow, index), stop=StoppingTest(kind="claim"))
         scale = flow.scale(near(flow, index))
-        assert outcome.steps[-1]["limited_by"] == "end of path"
+        assert outcome.rows[-1]["limited_by"] == "end of path"
         left = float(np.linalg.norm(flow.residual(outcome.state))) / scale
         assert left <= wanted
-        assert left > 1e-3 * wanted or outcome.steps[-1]["triangular_solves"] % 3 == 0  # three orders at least
+        assert left > 1e-3 * wanted or outcome.rows[-1]["triangular_solves"] % 3 == 0  # three orders at least
 
 
 def test_a_wanted_residual_takes_the_place_of_the_tolerance() -> None:

@@ -261,7 +261,7 @@ def test_products_and_jacobians_are_in_the_ledger() -> None:
     flow = spin_flow(0.5)
     start = near(flow, 0.52)
     outcome, ledger = run(flow, NewtonKrylov(products="jacobian"), Never(), start)
-    assert ledger.counts["jacobian"] == len(outcome.steps) - 1
+    assert ledger.counts["jacobian"] == len(outcome.rows) - 1
     assert ledger.counts["matrix_product"] == ledger.counts["triangular_solve"]
     outcome, ledger = run(flow, NewtonKrylov(products="series"), Never(), start)
     assert ledger.counts["jacobian"] == 1
@@ -293,13 +293,13 @@ def test_picard_contracts_by_one_minus_n(index: float, relaxed: bool) -> None:
     beta = 2.0 / (1.0 + index) if relaxed else 1.0
     outcome, ledger = run(flow, Picard(damping=beta), EveryIteration(), near(flow, index + 0.02))
     assert outcome.status is Status.CONVERGED
-    assert outcome.steps[-1]["contraction"] == pytest.approx(1.0 - beta * index, abs=0.02)
-    assert ledger.counts["factorization"] == ledger.counts["jacobian"] == len(outcome.steps) - 1
+    assert outcome.rows[-1]["contraction"] == pytest.approx(1.0 - beta * index, abs=0.02)
+    assert ledger.counts["factorization"] == ledger.counts["jacobian"] == len(outcome.rows) - 1
 
 
 def test_mixing_speeds_picard_up() -> None:
     flow = spin_flow(0.3)
-    counts = [len(run(flow, Picard(depth=depth), EveryIteration(), near(flow, 0.32))[0].steps) for depth in (0, 5)]
+    counts = [len(run(flow, Picard(depth=depth), EveryIteration(), near(flow, 0.32))[0].rows) for depth in (0, 5)]
     assert counts[1] < 0.6 * counts[0]
 
 
@@ -337,7 +337,7 @@ def test_pseudo_transient_ends_quadratically() -> None:
     flow = spin_flow(0.5)
     outcome, _ = run(flow, PseudoTransient(), EveryIteration(), near(flow, 0.6), stop=StoppingTest(tolerance=1e-12))
     assert outcome.status is Status.CONVERGED
-    assert order([row["residual_norm"] for row in outcome.steps]) > 1.6
+    assert order([row["residual_norm"] for row in outcome.rows]) > 1.6
 
 
 # Levenberg-Marquardt.
@@ -377,8 +377,8 @@ def test_the_residual_falls_at_each_step_of_levenberg_and_marquardt_from_afar() 
     far = ToyProblem.solution + 8.0 * np.cos(np.arange(12.0))
     outcome, ledger = run(ToyProblem(), LevenbergMarquardt(), EveryIteration(), far, DenseLU())
     assert outcome.status is Status.CONVERGED
-    assert (np.diff([row["residual_norm"] for row in outcome.steps]) < 0.0).all()
-    assert ledger.counts["factorization"] == ledger.counts["residual"] - 1 >= len(outcome.steps) - 1
+    assert (np.diff([row["residual_norm"] for row in outcome.rows]) < 0.0).all()
+    assert ledger.counts["factorization"] == ledger.counts["residual"] - 1 >= len(outcome.rows) - 1
 
 
 def test_a_step_is_refused_until_it_is_short_enough() -> None:
@@ -393,8 +393,8 @@ def test_a_step_is_refused_until_it_is_short_enough() -> None:
 
     outcome, ledger = run(Arctan(), LevenbergMarquardt(), EveryIteration(), np.full(2, 3.0), DenseLU())
     assert outcome.status is Status.CONVERGED
-    assert ledger.counts["factorization"] > len(outcome.steps) - 1
-    assert (np.diff([row["residual_norm"] for row in outcome.steps]) < 0.0).all()
+    assert ledger.counts["factorization"] > len(outcome.rows) - 1
+    assert (np.diff([row["residual_norm"] for row in outcome.rows]) < 0.0).all()
     kept, ledger = run(Arctan(), LevenbergMarquardt(), Never(), np.full(2, 3.0), DenseLU())
     assert kept.status is Status.STAGNATED
     assert kept.detail == "a step was refused because ‖R‖ does not fall, and the refresh rule keeps its matrix"
@@ -440,7 +440,7 @@ def test_the_residual_falls_at_each_step_of_a_trust_region_method_from_afar() ->
     far = ToyProblem.solution + 8.0 * np.cos(np.arange(12.0))
     outcome, _ = run(ToyProblem(), TrustRegion(), EveryIteration(), far, DenseLU())
     assert outcome.status is Status.CONVERGED
-    assert (np.diff([row["residual_norm"] for row in outcome.steps]) < 0.0).all()
+    assert (np.diff([row["residual_norm"] for row in outcome.rows]) < 0.0).all()
 
 
 def test_a_region_that_shrinks_to_nothing_is_a_status() -> None:
@@ -508,7 +508,7 @@ def test_scipys_work_is_in_the_ledger() -> None:
     """Every value of F is a residual and, but for those at y = 0, a solve; another one leads from the last y to u."""
     flow = spin_flow(0.5)
     outcome, ledger = run(flow, ScipyRoot(method="krylov"), Never(), near(flow, 0.52))
-    runs = len(outcome.steps) - 1
+    runs = len(outcome.rows) - 1
     assert outcome.status is Status.CONVERGED
     assert runs <= ledger.counts["residual"] + runs - ledger.counts["triangular_solve"] <= 3 * runs
     assert ledger.counts["factorization"] == 1

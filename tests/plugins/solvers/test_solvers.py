@@ -146,7 +146,7 @@ def test_newton_converges_quadratically_and_the_chord_linearly() -> None:
 
     def order(rule: RefreshRule) -> float:
         outcome, _ = run(flow, Newton(globalization={"kind": "none"}), rule, start)
-        r = np.array([row["residual_norm"] for row in outcome.steps])
+        r = np.array([row["residual_norm"] for row in outcome.rows])
         r = np.log(r[(r > 1e-11) & (r < 1e-3)])
         return float((r[-1] - r[-2]) / (r[-2] - r[-3]))
 
@@ -158,13 +158,13 @@ def test_newton_solves_a_linear_problem_in_one_step() -> None:
     flow = spin_flow(1.0)
     outcome, _ = run(flow, Newton(), EveryIteration(), near(flow, 0.5))
     assert outcome.status is Status.CONVERGED
-    assert len(outcome.steps) == 2
+    assert len(outcome.rows) == 2
 
 
 def test_backtracking_never_lets_the_residual_grow() -> None:
     flow = spin_flow(0.1324)
     outcome, _ = run(flow, Newton(), EveryIteration(), near(flow, 1.0))
-    residuals = [row["residual_norm"] for row in outcome.steps]
+    residuals = [row["residual_norm"] for row in outcome.rows]
     assert outcome.status is Status.CONVERGED
     assert (np.diff(residuals) < 0.0).all()
 
@@ -217,7 +217,7 @@ def test_the_method_yields_the_sum_of_the_recurrence() -> None:
     terms = coefficients(flow, flow.jacobian(start), start, 6)
     reach = min((1e-6 * np.linalg.norm(terms[0]) / np.linalg.norm(terms[j - 1])) ** (1 / (j - 1)) for j in (5, 6))
     a = min(1.0, reach)
-    assert outcome.steps[1]["range"] == pytest.approx(reach, rel=1e-6)
+    assert outcome.rows[1]["range"] == pytest.approx(reach, rel=1e-6)
     expected = start + sum(a ** (j + 1) * term for j, term in enumerate(terms))
     np.testing.assert_allclose(outcome.state, expected, atol=1e-9 * np.abs(expected).max())
 
@@ -266,12 +266,12 @@ def test_a_range_under_one_renews_the_tangent_under_the_papers_rule_and_not_othe
     start = near(flow, 0.5)
     outcome, ledger = run(flow, AsymptoticNumericalMethod(), RangeUnderOne(), start)
     assert outcome.status is Status.CONVERGED
-    assert outcome.steps[1]["range"] < 1.0
-    assert outcome.steps[1]["length"] == outcome.steps[1]["range"]
+    assert outcome.rows[1]["range"] < 1.0
+    assert outcome.rows[1]["length"] == outcome.rows[1]["range"]
     assert ledger.counts["factorization"] > 1
     kept, _ = run(flow, AsymptoticNumericalMethod(), Never(), near(flow, 0.31))
     assert kept.status is Status.CONVERGED
-    assert {row["tangents"] for row in kept.steps[1:]} == {1}
+    assert {row["tangents"] for row in kept.rows[1:]} == {1}
 
 
 @pytest.mark.parametrize("index", [0.5, 0.3])

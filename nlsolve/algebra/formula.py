@@ -1,0 +1,146 @@
+"""F(u) = 0 given as one formula: arrays run through it are residuals, seeded series its Jacobian."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+
+from nlsolve.algebra.colouring import Compression
+from nlsolve.contracts.problem import Expansion, NonlinearProblem
+from nlsolve.contracts.status import InputError, SolveError, Status
+from nlsolve.series import Array, Series
+
+NUMBERS = "iuf"
+"""Kinds of NumPy's types that become real numbers."""
+
+LONGEST_VALUE = 60
+"""Characters of a wrong value that are worth repeating."""
+
+UNFIT = (AttributeError, IndexError, TypeError, ValueError)
+"""What Python and NumPy raise when a formula for arrays asks of a series what only an array has."""
+
+
+class FormulaProblem(NonlinearProblem):
+    """F(u) = 0; the Jacobian is coefficient 1 of the formula run on u with the seeds of a group of columns.
+
+    formula : F, (U,) -> (U,). Where it is not analytic there is no Jacobian but a given one, and no expansion.
+    size : U.
+    pattern : where the Jacobian may differ from zero, a (U, U) matrix; None: anywhere.
+    jacobian : u -> J(u), dense or sparse (U, U), instead of the one from the formula.
+    columns : F acts on each column of an array (U, C), as that of a `System` does, so that one run of it serves all
+        groups of columns. A formula that knows states (U,) only is run once a group.
+    is_gradient : whether F is the gradient of a convex potential.
+
+    Its scale is 1: the published sets are judged by an absolute residual (‖F‖∞ < 1e-6 for the 23 problems), and F alone
+    does not tell the size of what cancels in it. `stop.tolerance` therefore is a bound on ‖F‖₂ itself.
+    """
+
+    def __init__(
+        self,
+        formula: Callable[[Any], Any],
+        size: int,
+        pattern: Any | None = None,
+        jacobian: Callable[[Array], Any] | None = None,
+        columns: bool = False,
+        is_gradient: bool = False,
+    ) -> None:
+        self.is_gradient = is_gradient
+        self._formula, self._given, self._columns = formula, jacobian, columns
+        self._compression = Compression(pattern, size)
+
+    def residual(self, u: Array) -> Array:
+        """F(u). Raises InputError where that is no (U,) array of real numbers."""
+        return real(self._formula(u), u.shape, "F(u)")
+
+    def jacobian(self, u: Array) -> Any:
+        """J(u), sparse (U, U). Raises SolveError (not applicable) where there is none, InputError for a wrong one."""
+        if self._given is not None:
+            return _matrix(self._given(u), len(u))
+        return self._compression.unpack(self.derivative(u, self._compression.seeds))
+
+    def expand(self, u: Array) -> Expansion:
+        """The formula run on a series that begins with u. Raises SolveError (not applicable) where it cannot be."""
+        path = Series(u)
+        try:
+            return Expansion(path, self._along(path))
+        except UNFIT as error:
+            raise SolveError(
+                Status.NOT_APPLICABLE,
+                "it is expanded by running F on a power series, and F does not run on one: choose a method that asks "
+                f"for residuals and Jacobians only, such as newton ({_said(error)})",
+            ) from error
+
+    def derivative(self, u: Array, directions: Array) -> Array:
+        """J(u) S for directions S, (U, C), from the formula. Raises SolveError (not applicable) where it cannot be."""
+        try:
+            if self._columns:
+                base = np.broadcast_to(u[:, None], directions.shape)
+                return self._along(_seeded(base, directions)).coefficient(1)
+            products = [self._along(_seeded(u, w)).coefficient(1) for w in directions.T]
+            return np.stack(products, axis=1) if products else directions
+        except UNFIT as error:
+            raise SolveError(
+                Status.NOT_APPLICABLE,
+                "its Jacobian is made by running F on a power series, and F does not run on one: give `jacobian`, or "
+                f"choose a method that asks for none, such as scipy-root without precondition ({_said(error)})",
+            ) from error
+
+    def _along(self, path: Series) -> Series:
+        """F(u(a)); a list or an array of the equations, each a series or a number, is put together."""
+        values = self._formula(path)
+        if isinstance(values, np.ndarray) and values.dtype == object:
+            values = values.tolist()
+        if isinstance(values, list | tuple) and any(isinstance(part, Series) for part in values):
+            values = np.stack(values)
+        if not isinstance(values, Series):  # F does not depend on u
+            return 0.0 * path + real(values, path.shape, "F(u)")
+        if values.shape != path.shape:
+            raise TypeError(f"F of a series of shape {path.shape} has shape {values.shape}")
+        return values
+
+
+def _seeded(u: Array, seeds: Array) -> Series:
+    """u + a S."""
+    path = Series(u)
+    path.append(seeds)
+    return path
+
+
+def _said(error: Exception) -> str:
+    return f"{type(error).__name__}: {error}"
+
+
+def real(values: Any, shape: tuple[int, ...], name: str) -> Array:
+    """`values` as an array of real numbers of this shape. Raises InputError that says what `name` is instead."""
+    if type(values) is np.ndarray and values.dtype == np.float64 and values.shape == shape:
+        return values
+    text = repr(values)
+    found = f"{name} = {text}" if len(text) <= LONGEST_VALUE and "\n" not in text else name
+    wanted = f"should be real numbers of shape {shape}"
+    if values is None:
+        raise InputError(f"{found}: {wanted}; does the function return them?")
+    try:
+        array = np.asarray(values)
+    except ValueError as error:
+        raise InputError(f"{found}: {wanted}, not lists of several lengths") from error
+    if array.dtype.kind == "c":
+        raise InputError(f"{found}: {wanted}; make real and imaginary parts unknowns of their own")
+    if array.dtype.kind not in NUMBERS:
+        raise InputError(f"{found}: {wanted}, not {array.dtype.type.__name__.removesuffix('_')}")
+    if array.shape != shape:
+        raise InputError(f"{found}: {wanted}, and has shape {array.shape}")
+    return array.astype(float)
+
+
+def _matrix(values: Any, size: int) -> Any:
+    """A given Jacobian, sparse (U, U)."""
+    if not sp.issparse(values):
+        return sp.csr_array(real(values, (size, size), "jacobian(u)"))
+    if values.shape != (size, size):
+        raise InputError(f"jacobian(u): should have shape {(size, size)}, and has shape {values.shape}")
+    matrix = sp.csr_array(values)
+    matrix.data = real(matrix.data, matrix.data.shape, "entries of jacobian(u)")
+    return matrix
