@@ -17,8 +17,8 @@ class Cavity(Rectangle):
     plain :   U = lid_speed, which jumps to zero in the corners (Ghia, Ghia & Shin 1982).
     smooth :  U = 16 ξ² (1 − ξ)² lid_speed, ξ = x/L: no singularity in the corners (Bourcier & François 1969).
 
-    Nothing flows in or out, so the flow needs a penalty, best with an iterated pressure (`divergence`). Nodes are
-    scattered, for a regular grid carries a pressure that alternates from cell to cell and is stirred up by the corners.
+    Walls enclose the material, so the flow needs a penalty, best with an iterated pressure (`divergence`). Nodes are
+    scattered by default: on a regular grid the corners excite a pressure that alternates from cell to cell.
     With `convection` the Reynolds number is set by the density, Re = ρ lid_speed L/μ; see `reynolds`.
     """
 
@@ -39,7 +39,7 @@ class Cavity(Rectangle):
 
     @property
     def reference_rate(self) -> float:
-        """Lid speed over side."""
+        """lid_speed/L [1/s]."""
         return self.lid_speed / self.side
 
     def reynolds(self, law: ConstitutiveLaw) -> float:
@@ -48,7 +48,7 @@ class Cavity(Rectangle):
         return self.density * self.lid_speed * self.side / viscosity
 
     def boundary_velocity(self, cloud: Cloud, law: ConstitutiveLaw, time: float) -> np.ndarray:
-        """The lid's profile on "top", its two corners held like all other walls."""
+        """(U(x), 0) on "top" without its two corners, 0 elsewhere."""
         lid = cloud.boundaries["top"]
         part = cloud.nodes[lid, 0] / self.side
         profile = np.ones(len(lid)) if self.lid == "plain" else 16.0 * part**2 * (1.0 - part) ** 2

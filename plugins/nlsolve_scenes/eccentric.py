@@ -12,7 +12,7 @@ from nlsolve.plugin import Cloud, ConstitutiveLaw, Exact, Scene
 from nlsolve_scenes.nodes.grading import lines, relative_spacing
 from nlsolve_scenes.nodes.scatter import jittered
 
-LEAST_ECCENTRICITY = 1e-2  # of the mean gap: the closed form loses as many digits as the poles are far away
+LEAST_ECCENTRICITY = 1e-2  # in mean gaps: the poles move away like 1/e, and the closed form loses digits as they do
 
 
 class EccentricCylinders(Scene):
@@ -31,8 +31,10 @@ class EccentricCylinders(Scene):
     outer_spin: float = Field(0.0, description="ω_o, counter-clockwise [rad/s]")
     spacing: float = Field(0.1, gt=0, description="mean distance of nodes across the widest gap [mm]")
     grading: float = Field(0.7, gt=0, le=1, description="distance of circles at the walls over that in the middle")
-    jitter: float = Field(0.0, ge=0, lt=0.5, description="random shift of interior nodes, part of the nearest distance")
-    seed: int = Field(0, ge=0, description="of the random shifts")
+    jitter: float = Field(
+        0.0, ge=0, lt=0.5, description="random shift of interior nodes, as a fraction of the distance to the nearest"
+    )
+    seed: int = Field(0, ge=0, description="seed of the random shifts")
 
     @model_validator(mode="after")
     def _one_inside_the_other(self) -> Self:
@@ -57,7 +59,7 @@ class EccentricCylinders(Scene):
 
     @property
     def reference_rate(self) -> float:
-        """Speed of the faster wall over the mean gap."""
+        """max(|ω_i| r_i, |ω_o| r_o)/(r_o − r_i) [1/s]."""
         speed = max(abs(self.inner_spin) * self.inner_radius, abs(self.outer_spin) * self.outer_radius)
         return speed / (self.outer_radius - self.inner_radius)
 
@@ -66,7 +68,7 @@ class EccentricCylinders(Scene):
         return Poles.of(self.inner_radius, self.outer_radius, self.eccentricity)
 
     def cloud(self, law: ConstitutiveLaw) -> Cloud:
-        """Bipolar circles as far apart as the nodes on them are; boundary groups "inner" and "outer"."""
+        """Nodes on bipolar circles, as far apart as the circles are; boundary groups "inner" and "outer"."""
         poles = self._poles
         first, last = (
             poles.level(r + centre) for r, centre in ((self.inner_radius, 0.0), (self.outer_radius, self.eccentricity))
@@ -84,11 +86,11 @@ class EccentricCylinders(Scene):
         return jittered(Cloud(nodes, groups), self.jitter, self.seed)
 
     def boundary_position(self, cloud: Cloud, time: float) -> np.ndarray:
-        """Where they were: circles that spin stay where they are."""
+        """Both circles stay where they are: a spin turns each into itself."""
         return cloud.nodes[cloud.boundary]
 
     def boundary_velocity(self, cloud: Cloud, law: ConstitutiveLaw, time: float) -> np.ndarray:
-        """Each wall turns about its own centre."""
+        """ω_i × z on "inner", ω_o × (z − e) on "outer"."""
         velocity = np.zeros_like(cloud.nodes)
         for name, spin, centre in (("inner", self.inner_spin, 0.0), ("outer", self.outer_spin, self.eccentricity)):
             x, y = cloud.nodes[cloud.boundaries[name]].T

@@ -13,11 +13,11 @@ from nlsolve.plugin import Cloud, ConstitutiveLaw, Scene
 from nlsolve_scenes.nodes.grading import lines, relative_spacing
 from nlsolve_scenes.nodes.scatter import jittered, scatter
 
-FIRST_ON_DIAGONAL = 0.75  # place of the inner node next to a corner, in distances of the walls' nodes
+FIRST_ON_DIAGONAL = 0.75  # distance in x and in y of the first interior node from a corner, in spacings of the walls
 
 
 class Rectangle(Scene):
-    """A scene in x₀ ≤ x ≤ x₀ + width, y₀ ≤ y ≤ y₀ + height, whose nodes stay where they are."""
+    """A scene in x₀ ≤ x ≤ x₀ + width, y₀ ≤ y ≤ y₀ + height, on fixed nodes."""
 
     spacing: float = Field(0.05, gt=0, description="mean distance of nodes [mm]")
     grading: float = Field(
@@ -27,8 +27,10 @@ class Rectangle(Scene):
         description="distance of nodes at the walls over that in the middle; on a grid 0.6 or more",
     )
     nodes: Literal["grid", "scattered"] = Field("grid", description="on grid lines, or scattered by repulsion")
-    jitter: float = Field(0.0, ge=0, lt=0.5, description="random shift of interior nodes, part of the nearest distance")
-    seed: int = Field(0, ge=0, description="of scattered nodes and of the random shifts")
+    jitter: float = Field(
+        0.0, ge=0, lt=0.5, description="random shift of interior nodes, as a fraction of the distance to the nearest"
+    )
+    seed: int = Field(0, ge=0, description="seed of scattered nodes and of the random shifts")
 
     @model_validator(mode="after")
     def _on_fixed_nodes(self) -> Self:
@@ -44,12 +46,12 @@ class Rectangle(Scene):
         """(x₀, y₀) and (x₀ + width, y₀ + height) [mm]."""
 
     def cloud(self, law: ConstitutiveLaw) -> Cloud:
-        """Boundary groups "bottom" and "top" (with the corners), "left" and "right" (without)."""
+        """Nodes with the boundary groups "bottom" and "top" (with the corners), "left" and "right" (without)."""
         filled = self._grid if self.nodes == "grid" else self._scattered
         return jittered(filled(), self.jitter, self.seed)
 
     def boundary_position(self, cloud: Cloud, time: float) -> np.ndarray:
-        """Where they were."""
+        """The walls stay where they are, at any time."""
         return cloud.nodes[cloud.boundary]
 
     def _grid(self) -> Cloud:
