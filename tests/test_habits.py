@@ -66,4 +66,4 @@ def test_files_that_contributing_names_are_there():
     named = set(re.findall(r"`((?:[\w.-]+/)*[\w-]*\.(?:py|md|toml|bib|yaml|cff))`", CONTRIBUTING))
     missing = {name for name in named if not (ROOT / name).exists()}
     assert len(named) > 8
-    assert missing == set()
+    assert missing == {"plugins/nlsolve_laws/my_law.py"}  # the one to be written
