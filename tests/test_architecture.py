@@ -9,7 +9,6 @@ import ast
 import re
 from collections.abc import Mapping, Set
 from graphlib import TopologicalSorter
-from pathlib import Path
 
 import pytest
 from test_floors import HOUSE, rules_of
