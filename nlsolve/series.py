@@ -8,7 +8,7 @@ operations; p orders of a whole formula therefore cost O(p²). Write a formula o
     `Series.seed(x)`    its derivative: coefficient 1 of f(x + a) is f′(x),
     a pushed `Series`   its Taylor coefficients along a path x(a).
 
-Recurrences: Griewank & Walther (2008), Evaluating Derivatives, table 13.2. What is not analytic (absolute value,
+Recurrences: Griewank & Walther, Evaluating Derivatives (2008), table 13.2. What is not analytic (absolute value,
 comparison, choice by condition) has no Taylor coefficients and raises TypeError.
 """
 

@@ -15,7 +15,8 @@ SOURCES = sorted(
 NAME = r"[A-Z][^\W\d_]+(?:-[A-Z][^\W\d_]+)*"
 LATER_NAME = rf"(?:van )?{NAME}"
 CITATION = re.compile(
-    rf"\b(?P<first>{NAME})(?:(?:, | & ){LATER_NAME})*(?: et al\.)?(?:'s)? \(?(?P<year>(?:1[89]|20)\d\d)\b"
+    rf"\b(?P<first>{NAME})(?:(?:, | & ){LATER_NAME})*(?: et al\.)?(?:, {NAME}(?: {NAME})+)?(?:'s)? "
+    r"\(?(?P<year>(?:1[89]|20)\d\d)\b"
 )
 NO_NAMES = {"The", "January", "June", "July"}  # "The 2015 paper", "June 2024"
 ENTRY = re.compile(r"^@(?P<kind>\w+)\{(?P<key>\w+),\n(?P<fields>(?:  .*\n)+)\}$", flags=re.MULTILINE)
@@ -51,6 +52,7 @@ def listed() -> set[tuple[str, str]]:
         ("(Anderson et al. 1999). A reciprocal", {("Anderson", "1999")}),
         ("Jeffery's (1922) solution", {("Jeffery", "1922")}),
         ("relaxation: Mulder & van Leer 1985; Kelley\n    & Keyes 1998)", {("Mulder", "1985"), ("Kelley", "1998")}),
+        ("Griewank & Walther, Evaluating Derivatives (2008), table 13.2", {("Griewank", "2008")}),
         ("Cochelin, Damil, Potier-Ferry (1994)", {("Cochelin", "1994")}),
         ("# so wrote (Moré, Garbow &\n# Hillstrom 1981)", {("Moré", "1981")}),
         ("as printed in the 2015 paper. The 2015 paper; aluminium 7075", set()),
