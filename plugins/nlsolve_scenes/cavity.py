@@ -17,8 +17,8 @@ class Cavity(Rectangle):
     plain :   U = lid_speed, which jumps to zero in the corners (Ghia, Ghia & Shin 1982).
     smooth :  U = 16 ξ² (1 − ξ)² lid_speed, ξ = x/L: no singularity in the corners (Bourcier & François 1969).
 
-    Walls enclose the material, so the flow needs a penalty, best with an iterated pressure (`divergence`). Nodes are
-    scattered by default: on a regular grid the corners excite a pressure that alternates from cell to cell.
+    Nothing flows in or out, so the flow needs a penalty, best with an iterated pressure (`divergence`). Nodes are
+    scattered, for a regular grid carries a pressure that alternates from cell to cell and is stirred up by the corners.
     With `convection` the Reynolds number is set by the density, Re = ρ lid_speed L/μ; see `reynolds`.
     """
 

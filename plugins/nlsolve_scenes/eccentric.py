@@ -31,10 +31,8 @@ class EccentricCylinders(Scene):
     outer_spin: float = Field(0.0, description="ω_o, counter-clockwise [rad/s]")
     spacing: float = Field(0.1, gt=0, description="mean distance of nodes across the widest gap [mm]")
     grading: float = Field(0.7, gt=0, le=1, description="distance of circles at the walls over that in the middle")
-    jitter: float = Field(
-        0.0, ge=0, lt=0.5, description="random shift of interior nodes, as a fraction of the distance to the nearest"
-    )
-    seed: int = Field(0, ge=0, description="seed of the random shifts")
+    jitter: float = Field(0.0, ge=0, lt=0.5, description="random shift of interior nodes, part of the nearest distance")
+    seed: int = Field(0, ge=0, description="of the random shifts")
 
     @model_validator(mode="after")
     def _one_inside_the_other(self) -> Self:
@@ -86,7 +84,7 @@ class EccentricCylinders(Scene):
         return jittered(Cloud(nodes, groups), self.jitter, self.seed)
 
     def boundary_position(self, cloud: Cloud, time: float) -> np.ndarray:
-        """Both circles stay where they are: a spin turns each into itself."""
+        """Where they were: circles that spin stay where they are."""
         return cloud.nodes[cloud.boundary]
 
     def boundary_velocity(self, cloud: Cloud, law: ConstitutiveLaw, time: float) -> np.ndarray:
