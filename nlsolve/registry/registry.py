@@ -130,7 +130,7 @@ class Registry:
                     f"it has no function {hookspecs.nlsolve_components.__name__} marked with @hookimpl "
                     "that returns component classes"
                 )
-            return [_checked(cls) for cls in itertools.chain(*answers)]
+            return [_checked(cls) for answer in answers for cls in answer]
         except Exception:
             if self._manager.is_registered(plugin):
                 self._manager.unregister(plugin)
