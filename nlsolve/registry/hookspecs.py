@@ -1,11 +1,9 @@
-"""The door for plugins: one hook, found through the entry-point group `nlsolve`.
+"""The hooks that a plugin may implement, each with an example that the tests run. There is one.
 
-# pyproject.toml                          # my_plugin.py
-[project.entry-points.nlsolve]            from nlsolve import ConstitutiveLaw, hookimpl
-mine = "my_plugin"
-                                          @hookimpl
-                                          def nlsolve_components():
-                                              return [MyLaw]
+A plugin is a module, found by its entry point in the group `nlsolve`. In the pyproject.toml of its package:
+
+    [project.entry-points.nlsolve]
+    honey = "honey"
 """
 
 from __future__ import annotations
@@ -17,7 +15,7 @@ import pluggy
 from nlsolve.contracts.component import Component
 
 PROJECT = "nlsolve"
-"""Name of the entry-point group and prefix of the hooks."""
+"""Name of the entry-point group, and of the project that the markers of hooks belong to."""
 
 hookspec = pluggy.HookspecMarker(PROJECT)
 hookimpl = pluggy.HookimplMarker(PROJECT)
@@ -25,4 +23,29 @@ hookimpl = pluggy.HookimplMarker(PROJECT)
 
 @hookspec
 def nlsolve_components() -> Iterable[type[Component]]:  # type: ignore[empty-body]
-    """The component classes this plugin offers: laws, scenes, discretizers, linear solvers, solvers, refresh rules."""
+    """The component classes that a plugin offers, of any contract: scenes, laws, discretizers, linear solvers, methods,
+    refresh rules, predictors and globalisations.
+
+    Called once a process, when the registry is loaded. A class declares its kind as a literal; its fields are the
+    parameters that a study may set. The module honey.py, all of it:
+
+        from typing import Any, Literal
+
+        from nlsolve.plugin import ConstitutiveLaw, hookimpl
+
+
+        class Honey(ConstitutiveLaw):  # μ(ε̄²) = μ₀
+            kind: Literal["honey"] = "honey"
+            viscosity_at_rest: float = 10.0
+
+            def viscosity(self, rate_squared: Any) -> Any:
+                return self.viscosity_at_rest + 0.0 * rate_squared
+
+
+        @hookimpl
+        def nlsolve_components():
+            return [Honey]
+
+    A hook that raises, or that returns anything else than concrete component classes, costs its own plugin only:
+    `nlsolve plugins` shows a row with the reason.
+    """

@@ -1,7 +1,7 @@
 """What is installed: the component classes that plugins offer, by noun and kind.
 
-A plugin that cannot be imported or registered takes nobody with it: it becomes a row with a reason. A kind that is
-offered twice belongs to nobody until one of the two packages is removed.
+A plugin that cannot be imported or registered does not disturb the others: it becomes a row with the reason. A kind
+that two plugins offer cannot be used until one of the two packages is removed.
 """
 
 from __future__ import annotations
@@ -112,13 +112,28 @@ class Registry:
             self._offers.setdefault((cls.noun, cls.kind_name()), []).append(_Offer(cls, source))
 
     def _offered_by(self, plugin: object) -> list[type[Component]]:
-        name = self._manager.register(plugin)
-        hooks = self._manager.hook.nlsolve_components.get_hookimpls()
-        own = next((hook for hook in hooks if hook.plugin_name == name), None)
-        if own is None:
-            raise TypeError("it has no function nlsolve_components marked with @hookimpl")
-        offered: Any = own.function()  # not through the manager, which would call every plugin at once
-        return [_checked(cls) for cls in offered]
+        """The checked classes of one plugin, which is asked alone: one that fails must not silence the others.
+
+        A plugin that fails is unregistered again. Raises whatever its hook raises, and TypeError or pluggy's
+        PluginValidationError for a plugin that does not keep to the hook.
+        """
+        if self._manager.is_registered(plugin):
+            raise ValueError("it is registered already")
+        try:
+            self._manager.register(plugin)
+            self._manager.check_pending()  # a marked function whose name is no hook's
+            others = self._manager.get_plugins() - {plugin}
+            answers = self._manager.subset_hook_caller(hookspecs.nlsolve_components.__name__, others)()
+            if not answers:
+                raise TypeError(
+                    f"it has no function {hookspecs.nlsolve_components.__name__} marked with @hookimpl "
+                    "that returns component classes"
+                )
+            return [_checked(cls) for answer in answers for cls in answer]
+        except Exception:
+            if self._manager.is_registered(plugin):
+                self._manager.unregister(plugin)
+            raise
 
     def _fail(self, source: str, reason: str) -> None:
         self._failures.append(PluginRow("", "", source, failure=reason))

@@ -12,7 +12,7 @@ from scipy.sparse.linalg import LinearOperator
 
 from nlsolve.plugin import Factors, LinearSolver, SolveError, Status
 
-# The diagonal is preferred as pivot, at the ordering of Aᵀ + A: nearly symmetric patterns are what flows have.
+# The diagonal is preferred as pivot, in the ordering of Aᵀ + A, because the patterns of flows are nearly symmetric.
 PIVOTING: dict[str, Any] = {
     "permc_spec": "MMD_AT_PLUS_A",
     "diag_pivot_thresh": 1e-3,
@@ -23,7 +23,7 @@ Map = Callable[[np.ndarray], np.ndarray]
 
 
 class Counted:
-    """A linear map that knows how often it was applied."""
+    """A linear map that counts how often it is applied."""
 
     def __init__(self, apply: Map) -> None:
         self._apply, self.count = apply, 0
@@ -78,19 +78,23 @@ class IncompleteFactors(Factors):
 
 
 class IluGmres(LinearSolver):
-    """Incomplete LU with thresholds (Li & Shao 2011) as preconditioner of GMRES. A `solve` is as many triangular solves
-    and products as it takes, and the ledger is told.
+    """Incomplete LU with thresholds (Li & Shao 2011) as preconditioner of GMRES. The ledger counts every
+    triangular solve and every product inside a `solve`.
     """
 
     kind: Literal["ilu-gmres"] = "ilu-gmres"
-    drop_tolerance: float = Field(1e-4, ge=0, lt=1, description="entries below this part of their column are left out")
-    fill_factor: float = Field(10.0, ge=1, description="entries of the factors allowed, over those of the matrix")
-    tolerance: float = Field(1e-10, gt=0, lt=1, description="‖rhs − A x‖ over ‖rhs‖ at which a solve ends")
+    drop_tolerance: float = Field(
+        1e-4, ge=0, lt=1, description="entries below this fraction of their column are left out"
+    )
+    fill_factor: float = Field(
+        10.0, ge=1, description="most entries of the factors, in multiples of those of the matrix"
+    )
+    tolerance: float = Field(1e-10, gt=0, lt=1, description="‖rhs − A x‖/‖rhs‖ at which a solve ends")
     dimension: int = Field(40, gt=0, description="largest dimension of the Krylov space")
-    restarts: int = Field(5, ge=0, description="how often the space may be begun anew")
+    restarts: int = Field(5, ge=0, description="most restarts of a solve, each with an empty Krylov space")
 
     def factorize(self, matrix: Any, previous: Factors | None = None) -> IncompleteFactors:
-        """Incomplete factors of a sparse matrix; the previous ones lend nothing."""
+        """Incomplete factors of a sparse matrix; `previous` is not used."""
         if not np.isfinite(matrix.data).all():
             raise SolveError(Status.NON_FINITE, "a tangent holds numbers that are not finite")
         return IncompleteFactors(matrix.tocsc(), self)

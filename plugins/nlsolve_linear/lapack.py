@@ -1,4 +1,4 @@
-"""P A = L U with dense factors: LAPACK, for small systems and for those that are dense anyway."""
+"""P A = L U with dense factors by LAPACK: for small systems, and for systems whose matrix is dense."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ class Lapack(LinearSolver):
     kind: Literal["lapack"] = "lapack"
 
     def factorize(self, matrix: Any, previous: Factors | None = None) -> DenseFactors:
-        """Dense factors of a sparse matrix; nothing of the previous ones serves them."""
+        """Dense factors of a sparse matrix; `previous` is not used."""
         if not np.isfinite(matrix.data).all():
             raise SolveError(Status.NON_FINITE, "a tangent holds numbers that are not finite")
         unknowns = matrix.shape[0]

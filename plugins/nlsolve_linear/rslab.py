@@ -1,6 +1,6 @@
 """Supernodal LU, and LDLᵀ for symmetric tangents, by rslab: an extra, nlsolve[rslab].
 
-The analysis of a pattern (ordering, supernodes) is lent by the previous factors as long as the pattern stays the same.
+The analysis of a pattern (ordering, supernodes) is taken from the previous factors as long as the pattern is the same.
 """
 
 from __future__ import annotations
@@ -19,9 +19,9 @@ try:
 except ImportError:  # an extra: nlsolve[rslab]
     rslab = None
 else:
-    rslab.set_log_level("error")  # what it warns of on standard error, a singular matrix, is raised as well
+    rslab.set_log_level("error")  # of a singular matrix it warns on standard error, and raises as well
 
-ASYMMETRY = 1e-12  # largest |A − Aᵀ| over largest |A| of a matrix whose lower triangle may stand for all of it
+ASYMMETRY = 1e-12  # largest |A − Aᵀ| over largest |A| of a matrix that counts as symmetric
 ABSENT = "needs the library rslab: pip install 'nlsolve[rslab]'"
 
 
@@ -43,11 +43,11 @@ class RslabFactors(Factors):
         self.fill = int(self._factors.factor_nnz)
 
     def _like(self, other: RslabFactors) -> bool:
-        """The same entries are stored, for the same kind of factors."""
+        """Whether both are factors of the same kind, of matrices with the same stored entries."""
         return self.path == other.path and all(map(np.array_equal, self._pattern, other._pattern))
 
     def solve(self, rhs: np.ndarray) -> np.ndarray:
-        """x with A x = rhs by one pair of triangular solves; refinement is the ledger's, rslab's own stays off."""
+        """x with A x = rhs by one pair of triangular solves, without rslab's refinement: the ledger refines."""
         return self._factors.solve(np.ascontiguousarray(rhs, dtype=float), refine=0)
 
     def condition(self) -> float:
@@ -74,8 +74,8 @@ class Rslab(LinearSolver):
     """LU with threshold pivoting, two-sided scaling and the sparsest of several orderings; Bunch & Kaufman (1977) for a
     symmetric matrix, at half the entries.
 
-    Pivots are looked for inside a supernode, which the tangents of flows are content with (residuals at rounding).
-    Entries spread at random over eight decades are not: ‖b − A x‖ is then 1e-9 of its terms, and `refinement` = 1
+    Pivots are searched within a supernode only. That is enough for the tangents of flows (residuals at rounding), but
+    not for entries spread at random over eight decades: ‖b − A x‖ is then 1e-9 of its terms, and `refinement` = 1
     brings it back to rounding.
     """
 
@@ -86,12 +86,12 @@ class Rslab(LinearSolver):
     absent: ClassVar[str | None] = ABSENT if rslab is None else None
 
     def factorize(self, matrix: Any, previous: Factors | None = None) -> RslabFactors:
-        """Factors of a sparse matrix, by the analysis of the previous ones if the pattern is theirs."""
+        """Factors of a sparse matrix, by the analysis of `previous` if that has the same pattern."""
         if rslab is None:
             raise SolveError(Status.NOT_APPLICABLE, f"the linear solver 'rslab' {ABSENT}")
         if not np.isfinite(matrix.data).all():
             raise SolveError(Status.NON_FINITE, "a tangent holds numbers that are not finite")
-        columns = matrix.tocsc(copy=True)  # sorted below, and what was handed in is left alone
+        columns = matrix.tocsc(copy=True)  # sorted below; the caller's matrix stays as it is
         columns.sum_duplicates()
         norm = float(abs(columns).sum(axis=0).max())
         if self.symmetric == "detect" and is_symmetric(columns):

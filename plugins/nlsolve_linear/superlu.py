@@ -1,4 +1,4 @@
-"""SuperLU as scipy ships it, with the column ordering measured on the matrix at hand."""
+"""P A Q = L U by SciPy's SuperLU; the column ordering Q is chosen by trying several on the first matrix."""
 
 from __future__ import annotations
 
@@ -22,32 +22,32 @@ ORDERINGS: dict[str, dict[str, Any]] = {
     "natural": {"permc_spec": "NATURAL"},
 }
 CANDIDATES = ("mmd-ata", "colamd", "mmd-at-plus-a")
-LENT = ("mmd-ata", "colamd")  # what costs a fifth to a half of a factorisation; ordering Aᵀ + A costs next to nothing
+REUSED = ("mmd-ata", "colamd")  # they cost a fifth to a half of a factorisation; ordering Aᵀ + A costs next to nothing
 
 
 class SuperLUFactors(Factors):
-    """L and U of one matrix A (compressed columns), or of A[:, order] when an equal pattern has lent its order."""
+    """L and U of one matrix A (compressed columns), or of A[:, order] with the order of an earlier, equal pattern."""
 
     def __init__(self, matrix: Any, ordering: str, previous: SuperLUFactors | None = None) -> None:
         self.ordering, self._pattern = ordering, (matrix.indptr, matrix.indices)
-        lent = previous if previous is not None and ordering in LENT and previous._like(self) else None
+        earlier = previous if previous is not None and ordering in REUSED and previous._like(self) else None
         # A[:, columns] is factorised, and x = y[places] of its solution y.
-        self._columns: Any = slice(None) if lent is None else lent._order
-        self._places: Any = slice(None) if lent is None else lent._inverse
+        self._columns: Any = slice(None) if earlier is None else earlier._order
+        self._places: Any = slice(None) if earlier is None else earlier._inverse
         try:
-            if lent is None:
+            if earlier is None:
                 self._factors = scipy.sparse.linalg.splu(matrix, **ORDERINGS[ordering])
             else:
                 self._factors = scipy.sparse.linalg.splu(matrix[:, self._columns], permc_spec="NATURAL")
         except RuntimeError as error:  # SuperLU's one way to say that a pivot vanished
             raise SolveError(Status.SINGULAR_TANGENT, f"SuperLU: {error}") from error
-        self._inverse: np.ndarray = self._factors.perm_c if lent is None else lent._inverse
-        self._order: np.ndarray = np.argsort(self._inverse) if lent is None else lent._order
+        self._inverse: np.ndarray = self._factors.perm_c if earlier is None else earlier._inverse
+        self._order: np.ndarray = np.argsort(self._inverse) if earlier is None else earlier._order
         self.fill = int(self._factors.nnz)
         self._norm = float(abs(matrix).sum(axis=0).max())
 
     def _like(self, other: SuperLUFactors) -> bool:
-        """The same ordering of the same stored entries."""
+        """Whether both have the same ordering, of matrices with the same stored entries."""
         return self.ordering == other.ordering and all(map(np.array_equal, self._pattern, other._pattern))
 
     def solve(self, rhs: np.ndarray) -> np.ndarray:
@@ -75,8 +75,8 @@ class SuperLU(LinearSolver):
     )
 
     def factorize(self, matrix: Any, previous: Factors | None = None) -> SuperLUFactors:
-        """Factors of a sparse matrix in the ordering that the previous factors of this march settled on, and in their
-        very order of columns as long as the pattern stays the same.
+        """Factors of a sparse matrix. With `previous` the ordering chosen there is kept, and with it the order of the
+        columns as long as the pattern is the same.
         """
         if not np.isfinite(matrix.data).all():
             raise SolveError(Status.NON_FINITE, "a tangent holds numbers that are not finite")

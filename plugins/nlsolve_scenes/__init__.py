@@ -1,4 +1,4 @@
-"""First-party scenes."""
+"""Flows to solve: the stirring tool of the 2015 paper, and flows with an exact solution or a published benchmark."""
 
 from __future__ import annotations
 

@@ -46,7 +46,7 @@ class Cavity(Rectangle):
 
     @property
     def reference_rate(self) -> float:
-        """Lid speed over side."""
+        """lid_speed/L [1/s]."""
         return self.lid_speed / self.side
 
     def reynolds(self, law: ConstitutiveLaw, density: float) -> float:
@@ -55,7 +55,7 @@ class Cavity(Rectangle):
         return density * self.lid_speed * self.side / viscosity
 
     def boundary_velocity(self, cloud: Cloud, law: ConstitutiveLaw, time: float) -> np.ndarray:
-        """The lid's profile on "top", its two corners held like all other walls."""
+        """(U(x), 0) on "top" without its two corners, 0 elsewhere."""
         lid = cloud.boundaries["top"]
         part = cloud.nodes[lid, 0] / self.side
         profile = np.ones(len(lid)) if self.lid == "plain" else 16.0 * part**2 * (1.0 - part) ** 2

@@ -26,18 +26,20 @@ class Channel(FlowScene):
     nodes: Literal["grid", "scattered"] | NodeFile = Field(
         "grid", description="a regular grid, scattered nodes, or those of a file"
     )
-    jitter: float = Field(0.0, ge=0, lt=0.5, description="random shift of inner nodes, part of the nearest distance")
-    seed: int = Field(0, ge=0, description="of everything random in the nodes")
+    jitter: float = Field(
+        0.0, ge=0, lt=0.5, description="random shift of interior nodes, as a fraction of the distance to the nearest"
+    )
+    seed: int = Field(0, ge=0, description="seed of scattered nodes and of the random shifts")
 
     keeps_nodes: ClassVar[str | None] = "material leaves the channel"
 
     @property
     def reference_rate(self) -> float:
-        """Mean speed over half the height."""
+        """mean_speed/H [1/s]."""
         return self.mean_speed / self.half_height
 
     def cloud(self, law: ConstitutiveLaw) -> Cloud:
-        """The nodes asked for, jittered inside; boundary groups "bottom", "top", "inlet", "outlet"."""
+        """Nodes with the boundary groups "bottom", "top", "inlet" and "outlet"; interior nodes are jittered."""
         if isinstance(self.nodes, NodeFile):
             cloud = self.nodes.cloud(("bottom", "top", "inlet", "outlet"))
         else:
@@ -45,7 +47,7 @@ class Channel(FlowScene):
         return jittered(cloud, self.jitter, self.seed)
 
     def boundary_position(self, cloud: Cloud, time: float) -> np.ndarray:
-        """Where they were."""
+        """The walls and both ends stay where they are, at any time."""
         return cloud.nodes[cloud.boundary]
 
     def boundary_velocity(self, cloud: Cloud, law: ConstitutiveLaw, time: float) -> np.ndarray:
@@ -76,7 +78,7 @@ class Channel(FlowScene):
         return Cloud(np.stack([x.ravel(), y.ravel()], axis=1), boundaries)
 
     def _scattered(self, grid: Cloud) -> Cloud:
-        """The walls of the grid, and scattered nodes between them."""
+        """The boundary nodes of the grid, and scattered nodes between them."""
         walls = {name: grid.nodes[group] for name, group in grid.boundaries.items()}
         middle, reach = np.array([0.5 * self.length, 0.0]), np.array([0.5 * self.length, self.half_height])
         return scatter(

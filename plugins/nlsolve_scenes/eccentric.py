@@ -12,7 +12,7 @@ from nlsolve.plugin import Cloud, ConstitutiveLaw, Exact, FlowScene, NodeMotion
 from nlsolve_scenes.nodes.grading import lines, relative_spacing
 from nlsolve_scenes.nodes.scatter import jittered
 
-LEAST_ECCENTRICITY = 1e-2  # of the mean gap: the closed form loses as many digits as the poles are far away
+LEAST_ECCENTRICITY = 1e-2  # in mean gaps: the poles move away like 1/e, and the closed form loses digits as they do
 
 
 class EccentricCylinders(FlowScene):
@@ -55,7 +55,7 @@ class EccentricCylinders(FlowScene):
 
     @property
     def reference_rate(self) -> float:
-        """Speed of the faster wall over the mean gap."""
+        """max(|ω_i| r_i, |ω_o| r_o)/(r_o − r_i) [1/s]."""
         speed = max(abs(self.inner_spin) * self.inner_radius, abs(self.outer_spin) * self.outer_radius)
         return speed / (self.outer_radius - self.inner_radius)
 
@@ -64,7 +64,7 @@ class EccentricCylinders(FlowScene):
         return Poles.of(self.inner_radius, self.outer_radius, self.eccentricity)
 
     def cloud(self, law: ConstitutiveLaw) -> Cloud:
-        """Bipolar circles as far apart as the nodes on them are; boundary groups "inner" and "outer"."""
+        """Nodes on bipolar circles, as far apart as the circles are; boundary groups "inner" and "outer"."""
         poles = self._poles
         first, last = (
             poles.level(r + centre) for r, centre in ((self.inner_radius, 0.0), (self.outer_radius, self.eccentricity))
@@ -86,7 +86,7 @@ class EccentricCylinders(FlowScene):
         return cloud.nodes[cloud.boundary]
 
     def boundary_velocity(self, cloud: Cloud, law: ConstitutiveLaw, time: float) -> np.ndarray:
-        """Each wall turns about its own centre."""
+        """ω_i × z on "inner", ω_o × (z − e) on "outer"."""
         velocity = np.zeros_like(cloud.nodes)
         for name, spin, centre in (("inner", self.inner_spin, 0.0), ("outer", self.outer_spin, self.eccentricity)):
             x, y = cloud.nodes[cloud.boundaries[name]].T

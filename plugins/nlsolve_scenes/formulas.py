@@ -1,6 +1,6 @@
 """f(x, y) from text, such as "sin(pi*x)*cosh(y)", and its derivatives by the arithmetic of series.
 
-The text is parsed, not run: numbers, x, y, pi, e, + − * / **, and the functions below are all it can hold.
+The text is parsed, never executed. It may hold numbers, x, y, pi, e, + − * / ** and the functions below only.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ def formula(text: str) -> Function:
     except SyntaxError as error:
         raise ValueError(f"{text!r} is not a formula ({error.msg}); it may hold {ALLOWED}") from None
     f = _compiled(tree.body)
-    return lambda x, y: f(x, y) + 0.0 * x  # a formula without x and y takes their shape too
+    return lambda x, y: f(x, y) + 0.0 * x  # a constant formula takes the shape of x too
 
 
 def _compiled(node: ast.expr) -> Function:

@@ -1,4 +1,4 @@
-"""Any smooth field in a rectangle, made a solution of any law by the body force it needs."""
+"""A given velocity field in a rectangle, and the body force that makes it the solution for any law."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from nlsolve.plugin import Cloud, ConstitutiveLaw, Exact, Physics, Series, Solve
 from nlsolve_scenes.formulas import Formula, Jet
 from nlsolve_scenes.nodes.rectangle import Rectangle, grid
 
-SAMPLES = 21  # a side: points at which the field is looked at before it is accepted
-ROUNDING = 1e-10  # of the largest velocity gradient: the divergence that is none
+SAMPLES = 21  # points on a side of the grid on which the field is checked
+ROUNDING = 1e-10  # largest divergence that counts as zero, as a fraction of the largest velocity gradient
 
 
 class Manufactured(Rectangle):
@@ -28,8 +28,8 @@ class Manufactured(Rectangle):
     u: Formula = Field("2*y + 0.3*sin(pi*x)*cos(pi*y)", description="velocity, x [mm/s]: a formula in x and y")
     v: Formula = Field("-0.3*cos(pi*x)*sin(pi*y)", description="velocity, y [mm/s]: a formula in x and y")
     p: Formula = Field("20*cos(x)*y", description="pressure, with a penalty [MPa]: a formula in x and y")
-    width: float = Field(1.0, gt=0, description="of the rectangle, along x [mm]")
-    height: float = Field(1.0, gt=0, description="of the rectangle, along y [mm]")
+    width: float = Field(1.0, gt=0, description="width of the rectangle, along x [mm]")
+    height: float = Field(1.0, gt=0, description="height of the rectangle, along y [mm]")
     origin: tuple[float, float] = Field((0.0, 0.0), description="lower left corner of the rectangle [mm]")
 
     @model_validator(mode="after")
@@ -61,13 +61,13 @@ class Manufactured(Rectangle):
 
     @property
     def corners(self) -> tuple[tuple[float, float], tuple[float, float]]:
-        """`origin`, and the corner across."""
+        """`origin`, and the corner opposite to it [mm]."""
         x, y = self.origin
         return (x, y), (x + self.width, y + self.height)
 
     @property
     def _samples(self) -> np.ndarray:
-        """Points all over the rectangle, its sides included, shape (SAMPLES², 2)."""
+        """Points of a regular grid in the rectangle and on its sides, shape (SAMPLES², 2)."""
         (x, y), (x_end, y_end) = self.corners
         return grid(np.linspace(x, x_end, SAMPLES), np.linspace(y, y_end, SAMPLES)).nodes
 
@@ -78,11 +78,11 @@ class Manufactured(Rectangle):
         return float(np.sqrt(np.mean(2.0 / 3.0 * (exx**2 + eyy**2 + 2.0 * exy**2))))
 
     def boundary_velocity(self, cloud: Cloud, law: ConstitutiveLaw, time: float) -> np.ndarray:
-        """The given field."""
+        """V at the boundary nodes."""
         return self._velocity(cloud.nodes[cloud.boundary])
 
     def exact(self, law: ConstitutiveLaw, points: np.ndarray, time: float) -> Exact:
-        """The given field, whatever the law."""
+        """V, the same for every law."""
         return Exact(self._velocity(points))
 
     def body_force(self, points: np.ndarray, law: ConstitutiveLaw, physics: Physics) -> np.ndarray:

@@ -12,8 +12,8 @@ from nlsolve_scenes.nodes.files import NodeFile
 from nlsolve_scenes.nodes.rings import Auto, GradedRings, Rings, Scattered
 
 Nodes = Annotated[Rings | GradedRings | Scattered | Auto | NodeFile, Field(discriminator="kind")]
-ON_CIRCLE = 1e-3  # largest distance of a wall's node of a file from its circle, in radii
-THINNEST = 1e-3  # least local index from which a layer is taken; a perfectly plastic law has none
+ON_CIRCLE = 1e-3  # largest distance of a wall node read from a file from its circle, in radii
+THINNEST = 1e-3  # least local index of the law that a layer is computed with: a perfectly plastic law has n = 0
 
 
 class StirringTool(FlowScene):
@@ -66,7 +66,10 @@ class StirringTool(FlowScene):
         return min(layer, 0.25 * (self.plate_radius - self.tool_radius))
 
     def cloud(self, law: ConstitutiveLaw) -> Cloud:
-        """The nodes asked for; boundary groups "tool" and "plate"."""
+        """Nodes with the boundary groups "tool" and "plate".
+
+        Raises SolveError (bad cloud) when a wall node read from a file is off its circle.
+        """
         if not isinstance(self.nodes, NodeFile):
             nodes = self.nodes.rings(self.layer(law)) if isinstance(self.nodes, Auto) else self.nodes
             return nodes.cloud(self.tool_radius, self.plate_radius)
@@ -83,7 +86,7 @@ class StirringTool(FlowScene):
         return cloud
 
     def boundary_position(self, cloud: Cloud, time: float) -> np.ndarray:
-        """The tool's nodes turned by ωt, or shifted by r_t (−sin ωt, 1 − cos ωt); the plate's where they were."""
+        """The tool's nodes turned by ωt, or shifted by r_t (−sin ωt, 1 − cos ωt); the plate's nodes stay."""
         position = cloud.nodes.copy()
         tool = cloud.boundaries["tool"]
         angle = self.angular_speed * time
@@ -95,7 +98,7 @@ class StirringTool(FlowScene):
         return position[cloud.boundary]
 
     def boundary_velocity(self, cloud: Cloud, law: ConstitutiveLaw, time: float) -> np.ndarray:
-        """Adhesion: the tool's velocity on its nodes, zero on the plate's."""
+        """Adhesion: V of the tool on its nodes, 0 on the plate's."""
         velocity = np.zeros_like(cloud.nodes)
         tool = cloud.boundaries["tool"]
         if self.motion == "spin":

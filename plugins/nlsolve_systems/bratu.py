@@ -21,20 +21,20 @@ class Bratu(System):
 
     kind: Literal["bratu"] = "bratu"
     strength: float = Field(1.0, ge=0, description="λ")
-    dimension: Literal[1, 2] = Field(1, description="of the domain")
+    dimension: Literal[1, 2] = Field(1, description="dimension of the domain")
     nodes: int = Field(32, gt=1, description="N, inner points on a side")
-    amplitude: float = Field(0.0, ge=0, description="of the start, this times sin πx (sin πy)")
+    amplitude: float = Field(0.0, ge=0, description="of the start, amplitude · sin πx (sin πy)")
 
     def formula(self, u: Any) -> Any:
-        """F(u)."""
+        """−Δu − λ eᵘ by second differences."""
         return minus_laplacian(self.nodes, self.dimension) @ u - self.strength * np.exp(u)
 
     def standard_start(self) -> np.ndarray:
-        """Half a wave."""
+        """amplitude · sin πx, or amplitude · sin πx sin πy."""
         return self.amplitude * on_points(np.sin(np.pi * places(self.nodes)), self.dimension)
 
     def pattern(self) -> Any:
-        """Of the Laplacian."""
+        """The pattern of the discrete Laplacian."""
         return minus_laplacian(self.nodes, self.dimension)
 
     def roots(self) -> np.ndarray | None:

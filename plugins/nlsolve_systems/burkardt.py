@@ -1,9 +1,9 @@
 """F(u) = 0 of TEST_NONLIN (J. Burkardt) as in SciML's NonlinearProblemLibrary: what is not in Moré, Garbow & Hillstrom.
 
-u has shape (U, …). Three of its problems differ from what they are named after; they are kept, as published figures are
-about them. "Watson" counts the powers of its polynomial from one too many and has x_2² in the place of x_1² (the
-code of 2024 had x_1² in the place of x_1 x_2 besides, and added to what its output held before); "discrete integral"
-takes j = k into both sums; "Chandrasekhar" has the right ends of the intervals in the place of their midpoints.
+u has shape (U, …). Three of its problems differ from those they are named after. They are kept as they are, because
+published figures refer to them: "Watson" starts the powers of its polynomial one too high and has x_2² instead of x_1²
+(the code of 2024 also had x_1² instead of x_1 x_2, and added to what its output held before); "discrete integral"
+counts j = k in both sums; "Chandrasekhar" has the right ends of the intervals instead of their midpoints.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from nlsolve.plugin import as_column
-from nlsolve_systems.more import discrete_integral, watson_interior
+from nlsolve_systems.more_garbow_hillstrom import discrete_integral, watson_interior
 
 TINY = 1e-4
 """Eigenvalue of Hammarling's matrices."""

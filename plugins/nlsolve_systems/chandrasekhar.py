@@ -10,8 +10,8 @@ from pydantic import Field
 from nlsolve.plugin import System
 from nlsolve_systems.burkardt import chandrasekhar_at
 
-SLOWEST = 0.97  # contraction of the iteration that finds the root
-ROUNDING = 1e-18
+SLOWEST = 0.97  # largest contraction factor with which the root is iterated
+ROUNDING = 1e-18  # error of the root, in extended precision
 
 
 class Chandrasekhar(System):
@@ -31,12 +31,12 @@ class Chandrasekhar(System):
         return (np.arange(self.size) + 0.5) / self.size
 
     def standard_start(self) -> np.ndarray:
-        """One everywhere."""
+        """H = 1."""
         return np.ones(self.size)
 
     def roots(self) -> np.ndarray | None:
-        """The smaller one, to which H ← 1/(1 − …) rises from one, an error by 1 − √(1 − c) each time; none near c = 1,
-        where that takes too long.
+        """The smaller root, by the iteration H ← 1/(1 − …) from H = 1, whose error shrinks by 1 − √(1 − c) each time;
+        None near c = 1, where that takes too many iterations.
         """
         rate = 1.0 - np.sqrt(1.0 - self.albedo)
         if rate > SLOWEST:
@@ -48,5 +48,5 @@ class Chandrasekhar(System):
 
     @property
     def singular(self) -> bool:
-        """At c = 1 the two roots meet."""
+        """True at c = 1, where the two roots meet."""
         return self.albedo == 1.0

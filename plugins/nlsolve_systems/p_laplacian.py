@@ -17,16 +17,16 @@ BISECTIONS = 200
 
 
 class PLaplacian(System):
-    """By linear elements on N × N inner points, each row over the area of a cell: a convex potential's gradient."""
+    """Linear elements on N × N inner points, each row divided by a cell's area: F is a convex potential's gradient."""
 
     kind: Literal["p-laplacian"] = "p-laplacian"
     power: float = Field(1.5, gt=1, description="p; 2 is linear")
     regularization: float = Field(1e-4, gt=0, description="ε")
-    dimension: Literal[1, 2] = Field(1, description="of the domain")
+    dimension: Literal[1, 2] = Field(1, description="dimension of the domain")
     nodes: int = Field(32, gt=1, description="N, inner points on a side")
 
     def formula(self, u: Any) -> Any:
-        """F(u)."""
+        """Σ_d B_dᵀ μ B_d u − 1,  μ = (Σ_d (B_d u)² + ε²)^{(p−2)/2}, with B_d the slope along d on each element."""
         gradient = slopes(self.nodes, self.dimension)
         components = [derivative @ u for derivative in gradient]
         square = sum(component**2 for component in components) + self.regularization**2
@@ -40,13 +40,13 @@ class PLaplacian(System):
         return on_points(x * (1.0 - x), self.dimension) / (3 - self.dimension)
 
     def pattern(self) -> Any:
-        """Points with an element in common."""
+        """An entry for each two points of an element."""
         touched = sum(abs(derivative) for derivative in slopes(self.nodes, self.dimension))
         return touched.T @ touched
 
     @property
     def is_gradient(self) -> bool:
-        """For every p > 1."""
+        """True for every p > 1."""
         return True
 
     def roots(self) -> np.ndarray | None:

@@ -13,7 +13,7 @@ from nlsolve_systems.catalogue import PROBLEMS, Listed
 
 
 class Published(System):
-    """A problem of the catalogue, by name; formulas and sources are in `nlsolve_systems.more` and `.burkardt`."""
+    """A problem of the catalogue, by name; formulas and sources are in `more_garbow_hillstrom` and `burkardt`."""
 
     kind: Literal["system"] = "system"
     problem: str = Field(description=f"one of {', '.join(PROBLEMS)}")
@@ -38,16 +38,16 @@ class Published(System):
 
     @property
     def listed(self) -> Listed:
-        """Its entry in the catalogue."""
+        """The catalogue's entry for this problem."""
         return PROBLEMS[self.problem]
 
     @property
     def unknowns(self) -> int:
-        """U."""
+        """`size`, or the published number of unknowns."""
         return self.size or self.listed.size
 
     def formula(self, u: Any) -> Any:
-        """F(u)."""
+        """The published formula, F(u) of shape (U, …)."""
         return self.listed.formula(u)
 
     def standard_start(self) -> np.ndarray:
@@ -55,20 +55,20 @@ class Published(System):
         return self.listed.start(self.unknowns)
 
     def pattern(self) -> Any | None:
-        """Of the banded ones."""
+        """Where the Jacobian of a banded problem is not zero; None for the others."""
         return None if self.listed.pattern is None else self.listed.pattern(self.unknowns)
 
     def roots(self) -> np.ndarray | None:
-        """In closed form, and those computed for the published size."""
+        """All known roots (K, U): in closed form, or computed for the published size; None if none is known."""
         return self.listed.roots(self.problem, self.unknowns)
 
     def nearest_root(self, u: np.ndarray) -> np.ndarray | None:
-        """Where the roots are more than a list, the one nearest to u."""
+        """The root nearest to u, also where the roots are a set that cannot be listed."""
         if self.listed.nearest is not None and self.unknowns == self.listed.size:
             return self.listed.nearest(u)
         return super().nearest_root(u)
 
     @property
     def singular(self) -> bool:
-        """As the catalogue says."""
+        """Whether the Jacobian is singular at a known root."""
         return self.listed.singular

@@ -1,8 +1,8 @@
 """Roots that have no closed form, at the published sizes: found by Newton's method from many starts and refined in
-extended precision until a step moved them by less than 1e-17 of their size; tests/test_systems.py repeats that.
+extended precision until a step moved them by less than 1e-17 of their size; tests/plugins/systems repeats that.
 
-TEST_NONLIN prints (1.098159e-5, 9.106146) for "powell-badly-scaled", where |F| is still 3.8e-7; of problems with
-several roots it prints one, and of those below none but the first.
+TEST_NONLIN prints (1.098159e-5, 9.106146) for "powell-badly-scaled", where |F| is still 3.8e-7. Of a problem with
+several roots it prints at most one, the first below.
 """
 
 from __future__ import annotations

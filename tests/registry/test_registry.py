@@ -48,6 +48,36 @@ class WithoutHook:
     """Nothing to register."""
 
 
+class Misspelt:
+    """A marked function that is no hook."""
+
+    @hookimpl
+    def nlsolve_component(self) -> Any:
+        return [Newton]
+
+
+class Empty:
+    """A hook that forgot to return."""
+
+    @hookimpl
+    def nlsolve_components(self) -> Any:
+        return None
+
+
+class Asking:
+    """A hook with an argument that nobody passes."""
+
+    @hookimpl
+    def nlsolve_components(self, registry: Any) -> Any:
+        return [Newton]
+
+
+class Uncomparable(Plugin):
+    """An object that cannot be put into a set."""
+
+    __hash__ = None  # type: ignore[assignment]
+
+
 class Raising:
     """A hook that fails."""
 
@@ -138,6 +168,13 @@ def test_two_plugins_with_one_name():
     ("plugin", "reason"),
     [
         (WithoutHook(), "TypeError: it has no function nlsolve_components marked with @hookimpl"),
+        (
+            Empty(),
+            "TypeError: it has no function nlsolve_components marked with @hookimpl that returns component classes",
+        ),
+        (Misspelt(), "PluginValidationError: unknown hook 'nlsolve_component' in plugin"),
+        (Asking(), "PluginValidationError: Plugin"),
+        (Uncomparable(Homotopy), "TypeError: unhashable type"),
         (Raising(), "RuntimeError: no licence found"),
         (Plugin(int), "TypeError: <class 'int'> is not a subclass of one of Scene, System"),
         (Plugin(NoKind), 'NoKind must declare its name: kind: Literal["name"] = "name"'),
@@ -154,6 +191,38 @@ def test_a_plugin_that_cannot_be_registered_fails_alone(plugin, reason):
     assert "\n" not in failure
     assert registry.plugins()[-1].source == "broken 0.1"
     assert "1 plugin(s) failed, see `nlsolve plugins`" in str(registry.complaint("solver", "nwton"))
+
+
+@pytest.mark.parametrize("plugin", [Raising(), Misspelt(), Asking(), Uncomparable(Homotopy), Plugin(int)])
+def test_what_comes_after_a_failed_plugin_is_registered(plugin):
+    registry = Registry()
+    registry.add(plugin, "broken 0.1")
+    registry.add(Plugin(Newton), "good 1.0")
+    assert registry.classes("solver") == {"newton": Newton}
+    assert len(failures(registry)) == 1
+
+
+def test_a_plugin_registered_twice_counts_once():
+    registry, plugin = Registry(), Plugin(Newton)
+    registry.add(plugin, "fakes 1.0")
+    registry.add(plugin, "fakes 1.0")
+    assert registry.classes("solver") == {"newton": Newton}
+    assert failures(registry) == ["the plugin cannot be registered: ValueError: it is registered already"]
+
+
+def test_a_hook_is_asked_once():
+    asked = []
+
+    class Counting:
+        @hookimpl
+        def nlsolve_components(self) -> Any:
+            asked.append(self)
+            return [Newton]
+
+    registry = Registry()
+    registry.add(Counting(), "counting 1.0")
+    registry.add(Plugin(Homotopy), "fakes 1.0")
+    assert len(asked) == 1
 
 
 def test_entry_points_are_loaded_one_at_a_time(tmp_path, monkeypatch):

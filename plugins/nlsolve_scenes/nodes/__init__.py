@@ -1,1 +1,1 @@
-"""Where nodes are placed: rings, rectangles, scattered points, files."""
+"""Node sets: rings, rectangles, scattered nodes, and nodes read from files."""

@@ -19,13 +19,13 @@ except ImportError:  # an extra: nlsolve[mesh]
     meshio = None
 
 HEADER = ["x", "y", "group"]
-FLAT = 1e-9  # largest extent across the plane, in the mesh's own
+FLAT = 1e-9  # largest extent of a mesh in z, as a fraction of its extent in x and y
 
 
 class NodeFile(BaseModel):
-    """Nodes [mm] as they stand in a file, with the names of the boundary groups the scene asks for.
+    """Nodes [mm] and boundary groups read from a file.
 
-    CSV : the header x,y,group, a line a node, group empty inside.
+    CSV : the header x,y,group, then one line for each node; group is empty for an interior node.
     mesh: points used by its triangles or quadrilaterals; groups are point sets, or named sets of its lines (Gmsh:
           "physical curves").
     """
@@ -33,10 +33,10 @@ class NodeFile(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid")
 
     kind: Literal["file"] = "file"
-    path: str = Field(description="file name, seen from where the study is run: .csv, .msh, .inp, .vtu, …")
+    path: str = Field(description="file name, relative to the folder the study is run in: .csv, .msh, .inp, .vtu, …")
 
     def cloud(self, needed: tuple[str, ...]) -> Cloud:
-        """The nodes with the groups `needed`; nodes of other groups are inner ones.
+        """The nodes with the groups `needed`; nodes of other groups become interior nodes.
 
         Raises SolveError (bad cloud) in one sentence when the file is missing, malformed or lacks a group.
         """
@@ -85,7 +85,7 @@ def _from_mesh(path: Path) -> tuple[np.ndarray, dict[str, np.ndarray]]:
         raise _bad(f"reading {path} needs meshio: pip install 'nlsolve[mesh]'")
     said = StringIO()
     try:
-        with redirect_stdout(said), redirect_stderr(said):  # meshio prints why it fails, and then leaves the program
+        with redirect_stdout(said), redirect_stderr(said):  # meshio prints the reason, then exits
             mesh = meshio.read(path)
     except (Exception, SystemExit) as error:
         reason = " ".join(said.getvalue().split()) or f"{type(error).__name__}: {error}"

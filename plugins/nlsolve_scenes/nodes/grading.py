@@ -1,4 +1,4 @@
-"""Distances that grow from both walls inwards by one factor a step."""
+"""Spacings that grow from both walls to the middle, each by the same factor over the one before."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import numpy as np
 
 
 def relative_spacing(depth: np.ndarray, grading: float) -> np.ndarray:
-    """h over its mean at the part 0 ≤ t ≤ ½ of the way across: proportional to g + 2 (1 − g) t, so g at a wall."""
+    """h over its mean at the depth 0 ≤ t ≤ ½ from a wall, in widths: proportional to g + 2 (1 − g) t, so g at it."""
     if grading == 1.0:
         return np.ones_like(depth)
     return (grading + 2.0 * (1.0 - grading) * depth) * np.log(1.0 / grading) / (1.0 - grading)

@@ -13,7 +13,7 @@ from nlsolve.plugin import Cloud, ConstitutiveLaw, FlowScene
 from nlsolve_scenes.nodes.grading import lines, relative_spacing
 from nlsolve_scenes.nodes.scatter import jittered, scatter
 
-FIRST_ON_DIAGONAL = 0.75  # place of the inner node next to a corner, in distances of the walls' nodes
+FIRST_ON_DIAGONAL = 0.75  # distance in x and in y of the first interior node from a corner, in spacings of the walls
 
 
 class Rectangle(FlowScene):
@@ -38,12 +38,12 @@ class Rectangle(FlowScene):
         """(x₀, y₀) and (x₀ + width, y₀ + height) [mm]."""
 
     def cloud(self, law: ConstitutiveLaw) -> Cloud:
-        """Boundary groups "bottom" and "top" (with the corners), "left" and "right" (without)."""
+        """Nodes with the boundary groups "bottom" and "top" (with the corners), "left" and "right" (without)."""
         filled = self._grid if self.nodes == "grid" else self._scattered
         return jittered(filled(), self.jitter, self.seed)
 
     def boundary_position(self, cloud: Cloud, time: float) -> np.ndarray:
-        """Where they were."""
+        """The walls stay where they are, at any time."""
         return cloud.nodes[cloud.boundary]
 
     def _grid(self) -> Cloud:

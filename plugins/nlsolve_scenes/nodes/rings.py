@@ -13,16 +13,18 @@ from nlsolve_scenes.nodes.scatter import jittered, scatter
 
 
 class NodeSet(BaseModel):
-    """What every node set can do to its nodes. The same fields give the same nodes."""
+    """The fields that all node sets have. Equal fields give equal nodes."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
-    jitter: float = Field(0.0, ge=0, lt=0.5, description="random shift of inner nodes, part of the nearest distance")
-    seed: int = Field(0, ge=0, description="of everything random in the nodes")
+    jitter: float = Field(
+        0.0, ge=0, lt=0.5, description="random shift of interior nodes, as a fraction of the distance to the nearest"
+    )
+    seed: int = Field(0, ge=0, description="seed of scattered nodes and of the random shifts")
 
 
 class AnnulusSet(NodeSet, ABC):
-    """Nodes of an annulus, boundary groups "tool" and "plate"."""
+    """Nodes of an annulus with the boundary groups "tool" and "plate"."""
 
     def cloud(self, inner: float, outer: float) -> Cloud:
         """The nodes between the radii `inner` and `outer` [mm]."""
@@ -40,7 +42,7 @@ class Rings(AnnulusSet):
     spacing: float = Field(0.25, gt=0, description="h [mm]")
 
     def regular(self, inner: float, outer: float) -> Cloud:
-        """Rings."""
+        """Rings at distances of h, or a little more or less so that the last one lies on the wall."""
         count = max(1, round((outer - inner) / self.spacing))
         return on_rings(np.linspace(inner, outer, count + 1), np.full(count + 1, self.spacing))
 
@@ -64,7 +66,7 @@ class GradedRings(GradedSet):
     kind: Literal["graded-rings"] = "graded-rings"
 
     def regular(self, inner: float, outer: float) -> Cloud:
-        """Rings, stretched so that the last one lies on the wall."""
+        """Rings at distances of h(r), stretched so that the last one lies on the wall."""
         radii = [inner]
         while radii[-1] < outer:
             radii.append(radii[-1] + float(self.local_spacing(np.array(radii[-1]), inner)))
@@ -73,12 +75,12 @@ class GradedRings(GradedSet):
 
 
 class Scattered(GradedSet):
-    """Nodes without any order, at the distances of graded rings: what a cloud cut from a part's drawing looks like."""
+    """Nodes in no order, at the spacing of graded rings, as an unstructured mesh has them."""
 
     kind: Literal["scattered"] = "scattered"
 
     def regular(self, inner: float, outer: float) -> Cloud:
-        """Both circles at equal distances, the rest scattered between them."""
+        """Nodes at equal distances on both circles, and scattered nodes between them."""
         walls = {
             name: on_circle(radius, self.local_spacing(np.array(radius), inner))
             for name, radius in (("tool", inner), ("plate", outer))
@@ -97,10 +99,10 @@ class Scattered(GradedSet):
 class Auto(NodeSet):
     """Graded rings with first = resolution · layer and even = layers · layer: the flow's layer at the tool decides.
 
-    The layer is the distance over which the strain rate at the tool falls by e, which the law and the motion fix (see
-    the scene). Even nodes across a few layers are worth more than ever finer ones at the tool. `smallest` bounds the
-    number of nodes where a layer is thinner than a study can pay for: it acts in the spin for n < 0.015, in the orbit
-    for n < 0.085. The column `smallest_spacing` of the runs says what was picked.
+    The layer is the distance over which the strain rate at the tool falls by e; it follows from the law and the motion
+    (see the scene). Evenly spaced nodes across a few layers reduce the error more than finer ones at the tool.
+    `smallest` limits the number of nodes where the layer is very thin: in the spin for n < 0.015, in the orbit for
+    n < 0.085. The column `smallest_spacing` of the runs holds the first spacing chosen.
     """
 
     kind: Literal["auto"] = "auto"
@@ -111,7 +113,7 @@ class Auto(NodeSet):
     smallest: float = Field(0.008, gt=0, description="least first spacing [mm]")
 
     def rings(self, layer: float) -> GradedRings:
-        """The graded rings picked for a layer [mm]."""
+        """The graded rings for a layer [mm]."""
         return GradedRings(
             first=min(max(self.resolution * layer, self.smallest), self.spacing),
             even=self.layers * layer,

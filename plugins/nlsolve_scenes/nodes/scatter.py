@@ -1,8 +1,8 @@
 """∫ 2/(√3 h²) dA : as many nodes as a triangular lattice of spacing h(x), h varying from place to place.
 
-Nodes are dropped where the integral has grown by one along a space-filling curve, so that every region receives its
-share from the start, and then repel each other until they are evenly spaced (Persson & Strang 2004: bars of length
-1.2 h that only push). All sweeps are batches over the nodes.
+A node is placed wherever the integral along a space-filling curve has grown by one, so that every region has its share
+from the start. Then nodes repel each other until they are evenly spaced (Persson & Strang 2004: bars of length 1.2 h
+that only push), each sweep one array operation over all nodes.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ NEIGHBOURS = 8
 BAR = 1.2  # length at which two nodes stop pushing each other, in h: the cloud stays under slight pressure throughout
 STEP = 0.25  # of the sum of the pushes
 SWEEPS = 40
-FROM_WALL = 0.75  # least distance of an inner node from the wall's nodes, in h: 0.56 h from a wall with nodes every h
+FROM_WALL = 0.75  # least distance of an interior node from the wall nodes, in h: 0.56 h from a wall with nodes every h
 
 
 def scatter(walls: Mapping[str, np.ndarray], inside: Function, spacing: Function, seed: int) -> Cloud:
@@ -40,7 +40,7 @@ def scatter(walls: Mapping[str, np.ndarray], inside: Function, spacing: Function
     def allowed(points: np.ndarray) -> np.ndarray:
         return inside(points) & (wall_tree.query(points)[0] > FROM_WALL * spacing(points))
 
-    nodes = _dropped(wall, inside, allowed, spacing, np.random.default_rng(seed))
+    nodes = _placed(wall, inside, allowed, spacing, np.random.default_rng(seed))
     for _ in range(SWEEPS):
         moved = nodes + STEP * _pushes(nodes, wall, spacing)
         nodes = np.where(allowed(moved)[:, None], moved, nodes)
@@ -50,7 +50,7 @@ def scatter(walls: Mapping[str, np.ndarray], inside: Function, spacing: Function
 
 
 def jittered(cloud: Cloud, jitter: float, seed: int) -> Cloud:
-    """x + jitter · d · uniform(−1, 1)², d the distance to the nearest neighbour: inner nodes only; 0 ≤ jitter < 0.5."""
+    """x + jitter · d · uniform(−1, 1)² for interior nodes, d the distance to the nearest node; 0 ≤ jitter < 0.5."""
     if jitter == 0.0:
         return cloud
     inner, nodes = cloud.interior, cloud.nodes.copy()
@@ -59,8 +59,8 @@ def jittered(cloud: Cloud, jitter: float, seed: int) -> Cloud:
     return replace(cloud, nodes=nodes)
 
 
-def _dropped(wall: np.ndarray, inside: Function, allowed: Function, spacing: Function, random: Generator) -> np.ndarray:
-    """Inner nodes at equal steps of ∫ 2/(√3 h²) dA over the cells of a quadtree, in the order of its curve."""
+def _placed(wall: np.ndarray, inside: Function, allowed: Function, spacing: Function, random: Generator) -> np.ndarray:
+    """Interior nodes at equal steps of ∫ 2/(√3 h²) dA over the cells of a quadtree, in the order of its curve."""
     low, high = wall.min(axis=0), wall.max(axis=0)
     centres, sides = 0.5 * (low + high)[None], np.array([(high - low).max()])
     quarters = 0.25 * np.array([[-1.0, -1.0], [1.0, -1.0], [-1.0, 1.0], [1.0, 1.0]])
@@ -84,7 +84,7 @@ def _dropped(wall: np.ndarray, inside: Function, allowed: Function, spacing: Fun
 
 
 def _pushes(nodes: np.ndarray, wall: np.ndarray, spacing: Function) -> np.ndarray:
-    """Σ_j max(0, 1.2 h − |x_i − x_j|) (x_i − x_j)/|x_i − x_j| over the neighbours, inner or on a wall, (F, 2) [mm]."""
+    """Σ_j max(0, 1.2 h − |x_i − x_j|) (x_i − x_j)/|x_i − x_j| over all neighbours, the walls' too, (F, 2) [mm]."""
     everyone = np.concatenate([nodes, wall])
     distance, index = cKDTree(everyone).query(nodes, 1 + min(NEIGHBOURS, len(everyone) - 1))
     h = spacing(everyone)

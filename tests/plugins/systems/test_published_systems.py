@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from nlsolve_systems import Bratu, Chandrasekhar, PLaplacian, Published
 from nlsolve_systems.burkardt import hammarling
-from nlsolve_systems.catalogue import MORE, PROBLEMS, TEST_NONLIN
+from nlsolve_systems.catalogue import MORE_GARBOW_HILLSTROM, PROBLEMS, TEST_NONLIN
 from nlsolve_systems.roots import COMPUTED
 from pydantic import ValidationError
 
@@ -47,7 +47,7 @@ def test_there_are_the_23_with_the_published_sizes() -> None:
     assert len(TEST_NONLIN) == 23
     sizes = [len(Published(problem=name).standard_start()) for name in TEST_NONLIN]
     assert sizes == [10, 4, 2, 4, 3, 2, 2, 10, 10, 10, 10, 10, 10, 10, 4, 9, 2, 2, 2, 1, 2, 2, 10]
-    assert not set(MORE) & set(TEST_NONLIN)
+    assert not set(MORE_GARBOW_HILLSTROM) & set(TEST_NONLIN)
 
 
 @pytest.mark.parametrize("problem", [name for name in PROBLEMS if name != "sample-18"])

@@ -1,7 +1,7 @@
 """F(u) = 0 after Moré, Garbow & Hillstrom (1981), Testing unconstrained optimization software, ACM TOMS 7(1), 17-41.
 
-Numbers (1) … (35) are theirs. u has shape (U, …); indices k run from 1 as in the paper. Nine of the first fourteen of
-Burkardt's TEST_NONLIN are word for word among them.
+A number (1) … (35) is the problem's number in the paper. u has shape (U, …); indices k run from 1 as in the paper. Nine
+of the first fourteen problems of Burkardt's TEST_NONLIN are problems of the paper, unchanged.
 """
 
 from __future__ import annotations
@@ -17,13 +17,13 @@ from nlsolve.plugin import as_column
 
 
 def numbers(u: Any) -> np.ndarray:
-    """k = 1 … U, as a column."""
+    """k = 1 … U, in a shape that combines with u."""
     return as_column(np.arange(1.0, u.shape[0] + 1.0), u)
 
 
 @cache
 def shifted(size: int, below: float, above: float) -> Any:
-    """The matrix with `below` and `above` beside an empty diagonal."""
+    """The tridiagonal matrix with `below` and `above` beside a zero diagonal."""
     return sp.diags_array([below, above], offsets=[-1, 1], shape=(size, size), format="csr")
 
 
@@ -107,7 +107,7 @@ def discrete_boundary_value(u: Any) -> Any:
 def discrete_integral(u: Any, both: bool = False) -> Any:
     """x_k + h/2 ((1 − t_k) Σ_{j≤k} t_j c_j + t_k Σ_{j>k} (1 − t_j) c_j),  c = (x + t + 1)³; (29).
 
-    With `both` j = k is in either sum.
+    With `both` the second sum counts j = k too.
     """
     h = 1.0 / (u.shape[0] + 1)
     t = h * numbers(u)
