@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from nlsolve.contracts.status import InputError, SolveError, Status
     from nlsolve.registry.problems import StudyError
     from nlsolve.running.interactive import compare, solve
+    from nlsolve.running.march import March, march
     from nlsolve.running.runner import Event, Results, run
     from nlsolve.running.store import StoreError
     from nlsolve.solving.simulate import Progress
@@ -35,7 +36,9 @@ _HOME = {
     "StoreError": "nlsolve.running.store",
     "Study": "nlsolve.study.study",
     "StudyError": "nlsolve.registry.problems",
+    "March": "nlsolve.running.march",
     "compare": "nlsolve.running.interactive",
+    "march": "nlsolve.running.march",
     "run": "nlsolve.running.runner",
     "solve": "nlsolve.running.interactive",
 }
@@ -43,6 +46,7 @@ _HOME = {
 __all__ = [
     "Event",
     "InputError",
+    "March",
     "Outcome",
     "Progress",
     "Results",
@@ -53,6 +57,7 @@ __all__ = [
     "StudyError",
     "__version__",
     "compare",
+    "march",
     "run",
     "solve",
 ]

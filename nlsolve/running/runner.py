@@ -101,7 +101,7 @@ def run(
     Raises StudyError for a study that cannot be run as it is written, StoreError for a folder that cannot hold its
     results.
     """
-    study = _study(study, overrides, quick)
+    study = study_of(study, overrides, quick)
     store = None if out is None else Store(Path(out), study)
     tell = listen or (lambda event: None)
     parts = _finished(study, store)
@@ -178,7 +178,7 @@ def _fastest(before: Part | None, again: Part, timing: Timing) -> Part:
     return replace(best, run={**best.run, "seconds_most": most, "rounds": rounds})
 
 
-def _study(study: Study | str | Path | Mapping[str, Any], overrides: Mapping[str, Any] | None, quick: bool) -> Study:
+def study_of(study: Study | str | Path | Mapping[str, Any], overrides: Mapping[str, Any] | None, quick: bool) -> Study:
     if isinstance(study, Study):
         if overrides or quick:
             raise StudyError(f"{study.name}: overrides and quick are applied when a study is read, not when it is run")

@@ -72,9 +72,10 @@ def run_case(
     parts: Any,
     listen: Callable[[Progress], None] | None = None,
     clock: Callable[[], float] = time.process_time,
+    watch: Callable[[Simulation], None] | None = None,
 ) -> Record:
     """Run the case of these components, by the names of their sections, `scene` among them; see `simulate`."""
-    return simulate(lambda entry: parts.scene.simulation(parts, entry), parts, listen, clock)
+    return simulate(lambda entry: parts.scene.simulation(parts, entry), parts, listen, clock, watch)
 
 
 @np.errstate(all="ignore")  # what is not finite becomes a status, a doubt or a NaN
@@ -83,13 +84,17 @@ def simulate(
     method: Method,
     listen: Callable[[Progress], None] | None = None,
     clock: Callable[[], float] = time.process_time,
+    watch: Callable[[Simulation], None] | None = None,
 ) -> Record:
     """Solve the problems of a simulation; every ending, failure included, is in the record.
 
     build : makes the simulation, whose work outside the method is entered in the books it is handed.
+    listen : is told how far the case is after every problem its method has solved.
     clock : what seconds are told by.
+    watch : is shown the simulation whenever it has kept a state.
     """
-    return _Run(build, method, listen or (lambda progress: None), clock).record()
+    nothing: Callable[[Any], None] = lambda told: None  # noqa: E731
+    return _Run(build, method, listen or nothing, clock, watch or nothing).record()
 
 
 class _Run:
@@ -101,8 +106,9 @@ class _Run:
         method: Method,
         listen: Callable[[Progress], None],
         clock: Callable[[], float],
+        watch: Callable[[Simulation], None],
     ) -> None:
-        self.method, self.listen = method, listen
+        self.method, self.listen, self.watch = method, listen, watch
         self.ledger, self.start_ledger = Ledger(clock), Ledger(clock)
         self.tangent = Tangent(method.linear, method.refresh, self.ledger)
         self.start_tangent = Tangent(method.linear, None, self.start_ledger)
@@ -146,8 +152,7 @@ class _Run:
             )
         self.blame = outcome.blame
         if outcome.status is Status.CONVERGED:
-            self.kept = task.problem, outcome.state
-            self.simulation.keep(task, outcome.state)
+            self.keep(task, outcome)
         return outcome
 
     def solved(self, task: Solve) -> Outcome:
@@ -166,9 +171,8 @@ class _Run:
         before = self.residual_norm if k else np.nan  # of a steady state the last solve counts: a start may repeat it
         self.residual_norm = float(np.fmax(before, outcome.residual_norm))
         if outcome.status is Status.CONVERGED:
-            self.kept = task.problem, outcome.state
             self.increments, self.time = max(k, 1), task.time
-            self.rows[-1] |= {"accepted": True, **self.simulation.keep(task, outcome.state)}
+            self.rows[-1] |= {"accepted": True, **self.keep(task, outcome)}
         self.listen(
             Progress(
                 max(k, self.increments),
@@ -178,6 +182,13 @@ class _Run:
             )
         )
         return outcome
+
+    def keep(self, task: Solve, outcome: Outcome) -> Mapping[str, float]:
+        """A state that solves its problem; returns columns of its last step."""
+        self.kept = task.problem, outcome.state
+        columns = self.simulation.keep(task, outcome.state)
+        self.watch(self.simulation)
+        return columns
 
     def summary(self, outcome: Outcome) -> dict[str, Any]:
         """The row of the case; what the simulation measures is of the last state that was kept."""

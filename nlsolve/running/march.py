@@ -1,0 +1,126 @@
+"""A flow in time from Python: its states, its fields, and its velocity at any points and times, without files."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from numpy.typing import ArrayLike
+from scipy.spatial import cKDTree
+
+from nlsolve.contracts.outcome import Outcome
+from nlsolve.contracts.scene import Simulation
+from nlsolve.contracts.status import InputError
+from nlsolve.flow.march import FlowSimulation
+from nlsolve.flow.momentum import Flow
+from nlsolve.flow.moving_nodes import LOST, within
+from nlsolve.flow.observables import nodal_fields
+from nlsolve.flow.state import FlowParts
+from nlsolve.registry.problems import StudyError
+from nlsolve.running.runner import study_of
+from nlsolve.series import Array
+from nlsolve.solving.simulate import Progress, run_case
+from nlsolve.study.study import Study
+
+
+@dataclass(frozen=True, eq=False)
+class March:
+    """A flow that has been marched, or the one state of a steady flow.
+
+    outcome : how it ended; a march that failed holds the increments before.
+    row : its row of `runs`.
+    steps : a row an iteration or series.
+    times : ends of the increments, the first state at t = 0 first, shape (K,) [s].
+    nodes, velocities : at these times, shape (K, N, 2) [mm], [mm/s].
+    """
+
+    outcome: Outcome
+    row: Mapping[str, Any]
+    steps: pd.DataFrame
+    times: Array
+    nodes: Array
+    velocities: Array
+    parts: FlowParts
+
+    def velocity(self, points: ArrayLike, time: float) -> Array:
+        """V at points (T, 2) [mm] and a time [s], shape (T, 2) [mm/s]; NaN outside the material.
+
+        In space by the discretizer, in time linear between the ends of the increments. Raises InputError for a time
+        that was not reached and for points of another shape.
+        """
+        places = np.asarray(points, dtype=float)
+        if places.ndim != 2 or places.shape[1] != 2:
+            raise InputError(f"March.velocity: points of shape {places.shape}: should be of shape (T, 2)")
+        after = int(np.searchsorted(self.times, self._reached("velocity", time)))
+        before = max(0, after - 1)
+        span = self.times[after] - self.times[before]
+        part = (time - self.times[before]) / span if span else 1.0
+        ends = [(before, 1.0 - part), (after, part)]
+        return np.sum([weight * self._at(k, places) for k, weight in ends if weight], axis=0)
+
+    def fields(self, time: float) -> pd.DataFrame:
+        """A row a node at the end of the increment nearest to `time` [s], with the columns of `fields`.
+
+        Raises InputError for a time that was not reached.
+        """
+        parts, k = self.parts, int(np.abs(self.times - self._reached("fields", time)).argmin())
+        initial = parts.scene.cloud(parts.law)
+        cloud, moment = initial.moved_to(self.nodes[k]), float(self.times[k])
+        wall = parts.scene.boundary_velocity(cloud, parts.law, moment)
+        flow = Flow(cloud, parts.discretizer.operators(cloud, False), parts.law, wall)
+        return nodal_fields(parts.scene, parts.discretizer, flow, self.velocities[k], initial, moment)
+
+    def _reached(self, caller: str, time: float) -> float:
+        if not len(self.times) or not self.times[0] <= time <= self.times[-1]:
+            reached = f"t = 0 to {self.times[-1]:g} s were" if len(self.times) else "no state was"
+            raise InputError(f"March.{caller}: time = {time:g}: {reached} solved; choose a time among them")
+        return time
+
+    def _at(self, k: int, places: Array) -> Array:
+        """V(x, t_k); NaN farther from every node than markers may be."""
+        nodes = self.nodes[k]
+        tree = cKDTree(nodes)
+        distance, nearest = tree.query(places)
+        spacing = tree.query(nodes, 2)[0][:, 1]
+        found: Array = self.parts.discretizer.values(nodes, within(nodes, places)) @ self.velocities[k]
+        found[(distance > LOST * spacing[nearest]) | (places != within(nodes, places)).any(axis=1)] = np.nan
+        return found
+
+
+def march(
+    study: Study | str | Path | Mapping[str, Any],
+    *,
+    overrides: Mapping[str, Any] | None = None,
+    quick: bool = False,
+    listen: Callable[[Progress], None] | None = None,
+) -> March:
+    """March the flow of a study with one case; nothing is written.
+
+    study : as for `run`; a dictionary needs no question, and its sections may be instances.
+    listen : is told after every increment.
+
+    Raises StudyError for a study that cannot be run as it is written, or has several cases; InputError where its scene
+    is no flow.
+    """
+    if isinstance(study, Mapping):
+        study = {"question": "What does the flow look like?", **study}
+    chosen = study_of(study, overrides, quick)
+    if len(chosen.cases) != 1:
+        raise StudyError(
+            f"{chosen.name}: a march is of one case, and the study has {len(chosen.cases)}: drop its sweeps"
+        )
+    parts = chosen.cases[0].parts
+    states: dict[float, tuple[Array, Array]] = {}
+
+    def watch(simulation: Simulation) -> None:
+        if not isinstance(simulation, FlowSimulation):
+            raise InputError(f"nlsolve.march: the scene {parts.scene.kind_name()!r} is no flow: use nlsolve.run")
+        states[simulation.state.time] = simulation.state.cloud.nodes, simulation.state.velocity
+
+    record = run_case(parts, listen, watch=watch)
+    nodes, velocities = (np.array([pair[i] for pair in states.values()]) for i in (0, 1))
+    return March(record.outcome, record.summary, record.steps, np.array(list(states)), nodes, velocities, parts)
