@@ -128,6 +128,11 @@ class Series:
     def __rmatmul__(self, matrix: Any) -> Series:
         return self._linear(lambda y: matrix @ y)
 
+    def __matmul__(self, other: Any) -> NoReturn:
+        raise NoSeries(
+            "a series stands on the right of @ only: write matrix @ u, and np.sum(u * v) for a product of two"
+        )
+
     def __neg__(self) -> Series:
         return self._linear(np.negative)
 
@@ -164,9 +169,12 @@ class Series:
     def __rtruediv__(self, other: Any) -> Series:
         return _quotient(_constant_series(other), self)
 
+    def __rpow__(self, base: Any) -> NoReturn:
+        raise NoSeries("a series can be raised to a constant power only; write exp(y log x) for a varying one")
+
     def __pow__(self, exponent: Any) -> Series:
         if not isinstance(exponent, Number):
-            raise NoSeries("a series can be raised to a constant power only; write exp(y log x) for a varying one")
+            self.__rpow__(self)
         power = float(exponent)  # type: ignore[arg-type]
         if power.is_integer() and power >= 1.0:  # by products, which are analytic at zero too
             half = self if power < 4.0 else self ** (power // 2.0)
@@ -186,6 +194,7 @@ class Series:
 
     __abs__ = __lt__ = __le__ = __gt__ = __ge__ = __bool__ = __float__ = _refuse
     __eq__ = __ne__ = _refuse
+    __mod__ = __rmod__ = __floordiv__ = __rfloordiv__ = _refuse
     __hash__ = object.__hash__
 
     def __array_ufunc__(self, ufunc: np.ufunc, method: str, *inputs: Any, **options: Any) -> Series:
@@ -340,7 +349,7 @@ _FORMULAS: dict[np.ufunc, Callable[..., Series]] = {
     np.subtract: lambda x, y: x - y if isinstance(x, Series) else -y + x,
     np.multiply: lambda x, y: x * y if isinstance(x, Series) else y * x,
     np.divide: lambda x, y: x / y if isinstance(x, Series) else y.__rtruediv__(x),
-    np.matmul: lambda matrix, x: x.__rmatmul__(matrix),
+    np.matmul: lambda matrix, x: x.__rmatmul__(matrix) if isinstance(x, Series) else matrix.__matmul__(x),
     np.negative: lambda x: -x,
     np.square: lambda x: x * x,
     np.power: lambda x, exponent: Series.__pow__(x, exponent),

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from nlsolve import series
-from nlsolve.plugin import Series, as_column
+from nlsolve.plugin import NoSeries, Series, as_column
 from nlsolve.series import Array
 
 ORDER = 30
@@ -339,22 +339,30 @@ REFUSED: dict[str, Callable[[Series], Any]] = {
     "np.add.reduce": np.add.reduce,
     "np.prod": np.prod,
     "np.sort": np.sort,
+    "%": lambda x: x % 1.0,
+    "//": lambda x: 1.0 // x,
 }
 
 
 @pytest.mark.parametrize("name", REFUSED)
 def test_what_has_no_taylor_coefficients_is_a_type_error_that_says_so(name: str) -> None:
-    with pytest.raises(TypeError, match="not analytic"):
+    with pytest.raises(NoSeries, match="not analytic") as caught:
         REFUSED[name](line(1.0))
+    assert isinstance(caught.value, TypeError)
 
 
 def test_a_varying_exponent_is_a_type_error_that_names_the_way_out() -> None:
     x = line(1.0)
-    for power in (lambda: x**x, lambda: x ** np.array([1.0]), lambda: np.power(x, x)):
-        with pytest.raises(TypeError, match=r"exp\(y log x\)"):
+    for power in (lambda: x**x, lambda: x ** np.array([1.0]), lambda: np.power(x, x), lambda: 2.0**x):
+        with pytest.raises(NoSeries, match=r"exp\(y log x\)"):
             power()
-    with pytest.raises(TypeError):
-        2.0**x
+
+
+@pytest.mark.parametrize("other", [np.eye(2), np.ones(2), Series([1.0, 2.0])])
+def test_a_series_on_the_left_of_a_product_is_refused_with_the_way_out(other: Any) -> None:
+    for product in (lambda x: x @ other, lambda x: np.matmul(x, other)):
+        with pytest.raises(NoSeries, match=r"write matrix @ u, and np.sum\(u \* v\)"):
+            product(Series([1.0, 2.0]))
 
 
 def test_only_the_series_one_made_can_be_appended_to() -> None:
