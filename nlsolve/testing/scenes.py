@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import numpy as np
 
-from nlsolve.algebra.simulation import Algebraic
+from nlsolve.algebra.system import System
+from nlsolve.contracts.continuum.geometry import Geometry
 from nlsolve.contracts.continuum.law import ConstitutiveLaw
-from nlsolve.contracts.continuum.scene import Scene
-from nlsolve.contracts.system import System
+from nlsolve.contracts.continuum.terms import NodeMotion, Physics
 from nlsolve.series import Series
 from nlsolve.testing.problems import check_problem
 from nlsolve.testing.promises import norm, require, same, shaped
 
 
-def check_scene(scene: Scene, law: ConstitutiveLaw) -> None:
+def check_scene(scene: Geometry, law: ConstitutiveLaw) -> None:
     """A cloud with an inside and boundary groups that share no node; boundary nodes that start where they are; shapes;
     an exact velocity, where there is one, that agrees with the prescribed one.
     """
@@ -31,9 +31,9 @@ def check_scene(scene: Scene, law: ConstitutiveLaw) -> None:
         np.isfinite(scene.reference_rate) and scene.reference_rate > 0, "reference_rate must be positive and finite"
     )
     inside = cloud.nodes[cloud.interior]
-    force = scene.body_force(inside, law)
+    force = scene.body_force(inside, law, Physics())
     require(force is None or force.shape == inside.shape, "body_force must have the shape of its points")
-    wall, contour = scene.moving_wall, scene.contour()
+    wall, contour = scene.moving_wall, scene.contour(NodeMotion())
     require(wall is None or wall in cloud.boundaries, f"the moving wall {wall!r} is none of the boundary groups")
     require(contour is None or (contour.ndim == 2 and contour.shape[1] == 2), "contour() must be a polygon (C, 2)")
     exact = scene.exact(law, cloud.nodes, 0.0)
@@ -56,7 +56,7 @@ def check_system(system: System, tolerance: float = 1e-6) -> None:
     require(together.shape == states.shape, f"F of shape {together.shape} for states of shape {states.shape}")
     for column, state in zip(together.T, states.T, strict=True):
         same(column, system.formula(state), norm(column) or 1.0, "F of several columns against F of each", 1e-12)
-    problem = Algebraic(system)
+    problem = system.equations()
     check_problem(problem, states[:, 0], tolerance)
     pattern = system.pattern()
     if pattern is not None:

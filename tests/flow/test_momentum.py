@@ -18,6 +18,7 @@ from nlsolve_solvers import Newton
 from nlsolve import Status
 from nlsolve.contracts.continuum.law import stress
 from nlsolve.flow.momentum import Flow, Inertia, node_major
+from nlsolve.plugin import Physics, PointOperators
 from nlsolve.solving.simulate import run_case as march
 from nlsolve.solving.stopping import Budget
 from nlsolve.testing import check_problem
@@ -99,11 +100,11 @@ def test_velocity_puts_the_boundary_back_and_unknowns_take_it_away() -> None:
 def test_terms_left_out_are_absent_not_zero() -> None:
     """Without a penalty the volumetric operators are not touched, were they anything at all."""
     plain = MovingLeastSquares().operators(CLOUD, False)
-    assert plain.dilatation is None
-    assert plain.pressure_force is None
+    assert plain.volumetric is None
     law = PowerLaw()
     held = SCENE.boundary_velocity(CLOUD, law, 0.0)
-    problem = Flow(CLOUD, replace(plain, dilatation=object(), pressure_force=object()), law, held, penalty_modulus=0.0)
+    anything = PointOperators(object(), object(), plain.strain.points)
+    problem = Flow(CLOUD, replace(plain, volumetric=anything), law, held, penalty_modulus=0.0)
     u = near(problem, 0.5)
     assert problem.pressure(u) is None
     same = flow("between", law.index).residual(u)
@@ -145,7 +146,7 @@ def test_the_exact_channel_profile_leaves_a_residual_that_shrinks() -> None:
         scene, law = Channel(spacing=spacing, jitter=0.1), PowerLaw(index=0.5, regularization=0.0)
         cloud = scene.cloud(PowerLaw())
         exact = scene.exact(law, cloud.nodes, 0.0)
-        force = scene.body_force(cloud.nodes[cloud.interior], law)
+        force = scene.body_force(cloud.nodes[cloud.interior], law, Physics())
         assert exact is not None
         assert force is not None
         problem = Flow(
