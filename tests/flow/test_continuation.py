@@ -195,8 +195,8 @@ def test_the_load_includes_the_force_on_the_body() -> None:
 
 def test_a_start_that_cannot_get_there_is_a_row_with_its_place() -> None:
     start = Start(adaptive=True, smallest=0.5, iterations=2)
-    scene = StirringTool(nodes=COARSE, horizon=1e-4, increment=1e-4)
-    row = march(setup(scene, 0.1324, start=start, budget=Budget(iterations=50), starter=Newton())).summary
+    parts = {"time": TimeSteps(horizon=1e-4), "start": start, "budget": Budget(iterations=50), "starter": Newton()}
+    row = march(setup(StirringTool(nodes=COARSE), 0.1324, **parts)).summary
     assert row["status"] == "budget spent"
     assert "on the way to the first state, at index = 0." in row["message"]
     assert "the adaptive continuation got from 1 to" in row["message"]

@@ -251,7 +251,7 @@ def test_quality_is_the_worst_so_far_and_a_cloud_that_collapses_is_bad() -> None
     back, _ = moving.move(moved, -velocity, None, 0.0)
     assert moving.quality == pytest.approx(0.5)
     with pytest.raises(
-        SolveError, match=r"is 0\.04 times as far from its neighbour as at t = 0: raise shifting"
+        SolveError, match=r"is 0\.04 times as far from its neighbour as at t = 0: raise motion\.shifting"
     ) as bad:
         moving.move(back, 1.92 * velocity, None, 0.0)
     assert bad.value.status is Status.BAD_CLOUD

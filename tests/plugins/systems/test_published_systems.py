@@ -10,7 +10,6 @@ from nlsolve_systems.catalogue import MORE, PROBLEMS, TEST_NONLIN
 from nlsolve_systems.roots import COMPUTED
 from pydantic import ValidationError
 
-from nlsolve.algebra.root_search import Algebraic
 from nlsolve.plugin import System
 from nlsolve.testing import check_system
 
@@ -57,7 +56,7 @@ def test_what_is_said_of_singular_roots(problem: str) -> None:
     system = Published(problem=problem)
     roots = system.roots()
     assert roots is not None
-    values = [np.linalg.svd(Algebraic(system).jacobian(root).toarray(), compute_uv=False) for root in roots]
+    values = [np.linalg.svd(system.equations().jacobian(root).toarray(), compute_uv=False) for root in roots]
     assert system.singular == any(v[-1] <= 1e-12 * max(v[0], 1.0) for v in values)
 
 
@@ -96,7 +95,7 @@ def test_at_the_fold_of_the_h_function_no_root_is_listed_and_it_is_said_to_be_si
     system = Chandrasekhar(size=10, albedo=1.0)
     assert system.roots() is None
     assert system.singular
-    problem = Algebraic(system)
+    problem = system.equations()
     u = system.start()
     for _ in range(40):
         u = u - np.linalg.lstsq(problem.jacobian(u).toarray(), problem.residual(u), rcond=None)[0]
@@ -157,8 +156,8 @@ def test_the_p_laplacian_with_two_is_poissons_equation() -> None:
     np.testing.assert_allclose(system.roots()[0], system.standard_start(), rtol=1e-14)
     square = PLaplacian(power=2.0, dimension=2, nodes=9)
     np.testing.assert_allclose(
-        Algebraic(square).jacobian(square.start()).toarray(),
-        Algebraic(Bratu(strength=0.0, dimension=2, nodes=9)).jacobian(square.start()).toarray(),
+        square.equations().jacobian(square.start()).toarray(),
+        Bratu(strength=0.0, dimension=2, nodes=9).equations().jacobian(square.start()).toarray(),
         atol=1e-10,
     )
 
