@@ -129,8 +129,9 @@ FEW = {"delaunay": 0.047, "mls": 0.07, "mls, conservative": 0.085}
 
 def bearing(name: str, spacing: float) -> pd.Series:
     """The run of the journal bearing, incompressible by an iterated pressure."""
-    scene = {"kind": "eccentric-cylinders", "spacing": spacing, "penalty": 1e3, "divergence": 1e-8}
-    return steady(scene, 1.0, BEARING[name], stop={"tolerance": 1e-10}).runs.iloc[0]
+    scene = {"kind": "eccentric-cylinders", "spacing": spacing}
+    physics = {"penalty": 1e3, "divergence_tolerance": 1e-8}
+    return steady(scene, 1.0, BEARING[name], physics=physics, stop={"tolerance": 1e-10}).runs.iloc[0]
 
 
 def bearings() -> None:
@@ -159,12 +160,13 @@ class Comparison:
 def orbit_against_reference(index: float) -> Comparison:
     """The steady orbit with λ/μ(100 1/s) = 1e4 on rings graded to the layer at the tool."""
     nodes = {"kind": "auto", "resolution": 0.45, "spacing": 0.18}
-    results = steady({"motion": "orbit", "penalty": 1e4, "nodes": nodes}, index, start={"values": [1.0, 0.7, 0.5, 0.4]})
+    scene, start = {"motion": "orbit", "nodes": nodes}, {"values": [1.0, 0.7, 0.5, 0.4]}
+    results = steady(scene, index, physics={"penalty": 1e4}, start=start)
     run, fields = results.runs.iloc[0], results.fields
     reference = pd.read_csv(REFERENCE / f"orbit_n{index:.1f}.csv")
     radius = np.hypot(reference["x"], reference["y"])
     reference = reference[(radius > 1.501) & (radius < 5.999)]
-    discretizer = results.study.cases[0].setup.discretizer
+    discretizer = results.study.cases[0].parts.discretizer
     values = discretizer.values(fields[["x", "y"]].to_numpy(), reference[["x", "y"]].to_numpy())
     difference = values @ fields[["u", "v"]].to_numpy() - reference[["u", "v"]].to_numpy()
     return Comparison(int(run["nodes"]), np.linalg.norm(difference, axis=1) / TOOL_SPEED, float(run["force_x"]))

@@ -30,14 +30,13 @@ STRATEGIES: dict[str, dict[str, Any]] = {
 
 def velocities(strategy: dict[str, Any]) -> np.ndarray:
     """Velocities (K, N, 2) at all recorded increments."""
-    setup = Study.from_toml(FIRST).cases[0].setup
-    increment = setup.scene.increment
+    first = Study.from_toml(FIRST).cases[0].parts
+    increment = first.time.increment
     document = {
         "question": "where do the methods differ?",
-        "scene": setup.scene.with_(horizon=INCREMENTS * increment),
-        "law": setup.law,
-        "discretizer": setup.discretizer,
-        "record": [k * increment for k in range(1, INCREMENTS + 1)],
+        **{name: getattr(first, name) for name in ("scene", "law", "physics", "motion", "discretizer")},
+        "time": first.time.with_(horizon=INCREMENTS * increment),
+        "record": {"times": [k * increment for k in range(1, INCREMENTS + 1)]},
         **strategy,
     }
     results = nlsolve.run(document)

@@ -42,7 +42,7 @@ def setup(kind: str, nodes: dict[str, Any], **fields: Any) -> Any:
         "discretizer": {"kind": kind, **fields},
         "solver": {"kind": "newton"},
     }
-    return nlsolve.Study.from_dict(study).cases[0].setup
+    return nlsolve.Study.from_dict(study).cases[0].parts
 
 
 def preparation(discretizer: Any, cloud: nlsolve.Cloud) -> None:

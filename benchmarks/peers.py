@@ -28,13 +28,10 @@ SCENES: dict[str, dict[str, Any]] = {
         "start": {"values": [1.0]},
     },
     f"{INCREMENTS} increments of the march, n = 0.1324": {
-        "scene": {
-            "kind": "stirring-tool",
-            "horizon": INCREMENTS * 1e-4,
-            "inertia": True,
-            "motion_of_nodes": "lagrangian",
-            "penalty": 100.0,
-        },
+        "scene": {"kind": "stirring-tool"},
+        "physics": {"inertia": True, "penalty": 100.0},
+        "time": {"horizon": INCREMENTS * 1e-4},
+        "motion": {"nodes": "lagrangian"},
         "law": {"kind": "power-law", "regularization": 1e-2},
     },
 }

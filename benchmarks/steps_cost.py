@@ -39,24 +39,29 @@ def measure(volume_points: str, repeats: int) -> None:
     study = nlsolve.Study.from_dict(
         {
             "question": "what does a step cost?",
-            "scene": {"kind": "stirring-tool", "penalty": 100.0},
+            "scene": {"kind": "stirring-tool"},
+            "physics": {"penalty": 100.0},
             "law": {"kind": "power-law"},
             "discretizer": {"kind": "mls", "volume_points": volume_points},
             "solver": {"kind": "newton"},
         }
     )
-    setup = study.cases[0].setup
-    scene, law, discretizer = setup.scene, setup.law, setup.discretizer
+    parts = study.cases[0].parts
+    scene, law, discretizer = parts.scene, parts.law, parts.discretizer
     cloud = scene.cloud(law)
     operators = discretizer.operators(cloud, True)
     flow = Flow(
-        cloud, operators, law, scene.boundary_velocity(cloud, law, 0.0), scene.penalty_modulus(law, np.zeros(1))
+        cloud,
+        operators,
+        law,
+        scene.boundary_velocity(cloud, law, 0.0),
+        parts.physics.penalty_modulus(law, scene.reference_rate, np.zeros(1)),
     )
     exact = scene.exact(law, cloud.nodes, 0.0)
     assert exact is not None
     state = flow.unknowns(exact.velocity)
     matrix = flow.jacobian(state)
-    factors = setup.linear.factorize(matrix)
+    factors = parts.linear.factorize(matrix)
     rhs = flow.residual(state)
 
     within = list[float]()  # seconds of triangular solves inside each series, where the factors have left the cache
@@ -82,7 +87,7 @@ def measure(volume_points: str, repeats: int) -> None:
         MOVED: lambda: discretizer.operators(cloud.moved_to(cloud.nodes), True),
         "residual": lambda: flow.residual(state),
         "Jacobian": lambda: flow.jacobian(state),
-        "factorisation": lambda: setup.linear.factorize(matrix, factors),
+        "factorisation": lambda: parts.linear.factorize(matrix, factors),
         f"{ORDER} triangular solves": solves,
         f"series of {ORDER} orders with its solves": series,
     }

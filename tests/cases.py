@@ -1,7 +1,8 @@
-"""Small flows that several tests share."""
+"""Small flows and systems that several tests share."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass, field
 from typing import Any
 
 from nlsolve_discretizers import MovingLeastSquares
@@ -17,7 +18,7 @@ from nlsolve.contracts.continuum.geometry import Geometry
 from nlsolve.contracts.outcome import Outcome
 from nlsolve.flow.momentum import Flow
 from nlsolve.flow.state import FlowParts
-from nlsolve.plugin import NonlinearProblem, NonlinearSolver, RefreshRule
+from nlsolve.plugin import LinearSolver, NonlinearProblem, NonlinearSolver, RefreshRule, Scene
 from nlsolve.series import Array
 from nlsolve.solving.driver import solve
 from nlsolve.solving.ledger import Ledger
@@ -72,3 +73,15 @@ def setup(scene: Geometry, index: float = 0.5, **parts: Any) -> FlowParts:
         "stop": StoppingTest(tolerance=1e-10),
     }
     return FlowParts(scene=scene, **(given | parts))
+
+
+@dataclass(frozen=True)
+class SystemParts:
+    """A case of a system, or of any scene that declares no section of its own: Newton, but for the parts given."""
+
+    scene: Scene
+    linear: LinearSolver = PLAIN
+    solver: NonlinearSolver = field(default_factory=Newton)
+    refresh: RefreshRule = field(default_factory=EveryIteration)
+    stop: StoppingTest = field(default_factory=StoppingTest)
+    budget: Budget = field(default_factory=Budget)

@@ -18,13 +18,13 @@ from nlsolve.plugin import (
     ConstitutiveLaw,
     Discretizer,
     Factors,
+    FlowScene,
     LinearSolver,
     NonlinearSolver,
     Operators,
     PointOperators,
     Predictor,
     RefreshRule,
-    Scene,
     Step,
     TangentHistory,
     hookimpl,
@@ -47,8 +47,8 @@ class Random(Component):
     seed: int = 0
 
 
-class Box(Scene):
-    """A scene with nested kinds."""
+class Box(FlowScene):
+    """A flow with nested kinds."""
 
     kind: Literal["box"] = "box"
     side: Literal["left", "right"] = "left"
@@ -225,10 +225,10 @@ def write_study(folder: Path, *changes: tuple[str, str], text: str = STUDY) -> P
 
 
 def fake_march(
-    setup: FlowParts, listen: Callable[[Progress], None] | None = None, clock: Callable[[], float] | None = None
+    parts: FlowParts, listen: Callable[[Progress], None] | None = None, clock: Callable[[], float] | None = None
 ) -> Record:
     """A record whose numbers follow from the solver's parameters."""
-    order, tolerance = getattr(setup.solver, "order", 1), getattr(setup.solver, "tolerance", 1.0)
+    order, tolerance = getattr(parts.solver, "order", 1), getattr(parts.solver, "tolerance", 1.0)
     if listen is not None:
         listen(Progress(1, 2, 3, 4))
     steps = pd.DataFrame({"increment": [0, 1], "time": [0.0, 0.1], "accepted": [True, True], "range": [1.5, np.nan]})

@@ -12,7 +12,7 @@ import pandas as pd
 from nlsolve.contracts.outcome import Outcome
 from nlsolve.contracts.problem import NonlinearProblem
 from nlsolve.contracts.scene import Entry, Simulation, Solve, Workload
-from nlsolve.contracts.status import Status
+from nlsolve.contracts.status import SolveError, Status
 from nlsolve.flow.continuation import Solves, Stage, walk
 from nlsolve.flow.incompressibility import iterate_pressure
 from nlsolve.flow.momentum import Flow
@@ -196,5 +196,8 @@ class FlowSimulation(Simulation):
 
     def diagnostics(self) -> list[dict[str, Any]]:
         cloud = self.parts.scene.cloud(self.parts.law)
-        found = self.parts.discretizer.diagnostics(cloud) or [{"operator": "this discretizer gives no diagnostics"}]
+        try:
+            found = self.parts.discretizer.diagnostics(cloud) or [{"operator": "this discretizer gives no diagnostics"}]
+        except SolveError as refusal:
+            return [{"operator": refusal.detail}]
         return [{"nodes": len(cloud.nodes), **row} for row in found]

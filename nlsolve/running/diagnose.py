@@ -25,19 +25,20 @@ def diagnose(study: Study) -> pd.DataFrame:
 
     A cloud or discretizer that refuses leaves a row whose `operator` is the sentence.
     """
-    seen: list[list[dict[str, Any]]] = []
+    seen: list[Any] = []
     rows: list[dict[str, Any]] = []
     for case in study.cases:
         named = {name: case.parameters[name] for name in case.swept if telling(name)}
         try:
             simulation = case.parts.scene.simulation(case.parts, Ledger().entry)
-            found = simulation.diagnostics() or [{"operator": NO_CLOUD}]
+            found = simulation.diagnostics()
         except SolveError as error:
             refused = {**named, "operator": error.detail}
             rows += [refused] if refused not in rows else []
             continue
-        if found not in seen:
-            seen.append(found)
-            rows += [{**named, **row} for row in found]
+        told = found or case.parts.scene
+        if told not in seen:
+            seen.append(told)
+            rows += [{**named, **row} for row in found or [{"operator": NO_CLOUD}]]
     swept = list(dict.fromkeys(name for case in study.cases for name in case.swept if telling(name)))
     return pd.DataFrame(rows, columns=[*swept, "nodes", *DIAGNOSTICS])

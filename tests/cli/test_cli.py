@@ -71,8 +71,8 @@ def test_run_without_tables_lists_endings(tmp_path):
 
 
 def test_divergence_is_a_result(tmp_path, monkeypatch):
-    def march(setup, listen, clock):
-        record = fake_march(setup, listen)
+    def march(parts, listen, clock):
+        record = fake_march(parts, listen)
         record.summary["status"] = "diverged"
         return record
 
@@ -84,7 +84,7 @@ def test_divergence_is_a_result(tmp_path, monkeypatch):
 
 
 def test_a_crash_is_1(tmp_path, monkeypatch):
-    def march(setup, listen, clock):
+    def march(parts, listen, clock):
         raise RuntimeError("[oops]")
 
     monkeypatch.setattr("nlsolve.running.runner.run_case", march)
@@ -96,12 +96,12 @@ def test_a_crash_is_1(tmp_path, monkeypatch):
 def test_an_interruption_is_130_and_keeps_what_is_finished(tmp_path, monkeypatch):
     count = 0
 
-    def march(setup, listen, clock):
+    def march(parts, listen, clock):
         nonlocal count
         count += 1
         if count == 2:
             raise KeyboardInterrupt
-        return fake_march(setup, listen)
+        return fake_march(parts, listen)
 
     monkeypatch.setattr("nlsolve.running.runner.run_case", march)
     result = nlsolve("run", write_study(tmp_path), "--out", "o")
@@ -166,7 +166,7 @@ def test_plan(tmp_path):
     assert result.exit_code == 0
     assert "4 cases" in result.stdout
     assert "then one factorisation and 20 pairs of triangular solves an increment" in result.stdout
-    cases = json.loads(nlsolve("plan", path, "--set", "scene.horizon=1e-3", "--json").stdout)["cases"]
+    cases = json.loads(nlsolve("plan", path, "--set", "time.horizon=1e-3", "--json").stdout)["cases"]
     assert [(row["increments"], row["nodes"], row["unknowns"]) for row in cases] == [(10, 4, 2)] * 4
     first = cases[0]
     assert first["seconds_increment"] > first["seconds_factorization"] + 20 * first["seconds_triangular_solve"]

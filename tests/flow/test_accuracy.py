@@ -14,11 +14,11 @@ from nlsolve_linear.superlu import SuperLU
 from nlsolve_scenes import Channel, StirringTool
 from nlsolve_scenes.nodes.rings import GradedRings, Rings
 
-from nlsolve.plugin import Scene
+from nlsolve.plugin import FlowScene, Physics
 from nlsolve.solving.simulate import run_case as march
 
 
-def solved(scene: Scene, index: float, **parts: Any) -> dict[str, Any]:
+def solved(scene: FlowScene, index: float, **parts: Any) -> dict[str, Any]:
     law = PowerLaw(index=index, regularization=1e-3)
     row = march(setup(scene, law=law, linear=SuperLU(), **parts)).summary
     assert row["status"] == "converged", row["message"]
@@ -174,7 +174,8 @@ class TestPenalty:
     @pytest.mark.parametrize("index", [0.5, 0.1324])
     def test_the_penalty_does_not_lock(self, index: float) -> None:
         errors = [
-            solved(StirringTool(nodes=self.nodes, penalty=penalty), index)["velocity_error"] for penalty in (1.0, 1e4)
+            solved(StirringTool(nodes=self.nodes), index, physics=Physics(penalty=penalty))["velocity_error"]
+            for penalty in (1.0, 1e4)
         ]
         assert abs(errors[1] - errors[0]) < self.part * errors[0]
 
@@ -182,7 +183,7 @@ class TestPenalty:
     @pytest.mark.parametrize("index", [0.5, 0.1324])
     def test_nor_anywhere_between(self, index: float) -> None:
         errors = [
-            solved(StirringTool(nodes=self.nodes, penalty=penalty), index)["velocity_error"]
+            solved(StirringTool(nodes=self.nodes), index, physics=Physics(penalty=penalty))["velocity_error"]
             for penalty in (1.0, 10.0, 100.0, 1e3, 1e4)
         ]
         assert max(errors) - min(errors) < self.part * errors[0]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -16,23 +17,25 @@ from pydantic import ValidationError
 
 from nlsolve import Status, Study
 from nlsolve.contracts.outcome import Outcome
-from nlsolve.flow.continuation import Stage, Start, walk
+from nlsolve.flow.continuation import Solves, Stage, Start, walk
+from nlsolve.plugin import Solve, TimeSteps
 from nlsolve.registry.problems import StudyError
 from nlsolve.solving.simulate import run_case as march
 from nlsolve.solving.stopping import Budget
+from nlsolve.testing.toy_problem import SmallProblem
 
 COARSE = Rings(spacing=0.5)
 LAW = PowerLaw(index=0.1, regularization=1e-3)
 
 
 class Guarded:
-    """A solver of stages that succeeds within `reach` of the last one in log(by), in a given number of iterations."""
+    """Ends of stages: a solve succeeds within `reach` of the last one in log(by), in a given number of iterations."""
 
     def __init__(self, reach: float, iterations: int = 5) -> None:
         self.reach, self.iterations, self.at = reach, iterations, np.inf
         self.asked: list[float] = []
 
-    def __call__(self, stage: Stage, last: bool) -> Outcome:
+    def __call__(self, stage: Stage) -> Outcome:
         self.asked.append(stage.value)
         solved = not abs(np.log(self.at / stage.value)) > self.reach if np.isfinite(self.at) else True
         self.at = stage.value if solved else self.at
@@ -40,47 +43,64 @@ class Guarded:
         return Outcome(status, status.sentence, np.zeros(1), 0.0, tuple({} for _ in range(self.iterations + 1)))
 
 
+def walked(start: Start, end: Callable[[Stage], Outcome]) -> tuple[Outcome, Stage]:
+    """The way under `LAW`, a solve for each stage, which ends as it is told; the last outcome, and of which stage."""
+    stages: list[Stage] = []
+
+    def solve(stage: Stage, last: bool) -> Solves:
+        stages.append(stage)
+        return (yield Solve(SmallProblem(), SmallProblem.solution))
+
+    way = walk(start, LAW, solve)
+    try:
+        next(way)
+        while True:
+            way.send(end(stages[-1]))
+    except StopIteration as finished:
+        return finished.value
+
+
 # The stages.
 
 
 def test_natural_stages_are_the_values_on_the_way_and_the_target() -> None:
     solve = Guarded(10.0)
-    outcome, stage = walk(Start(values=(1.0, 0.3, 0.05)), LAW, solve)
+    outcome, stage = walked(Start(values=(1.0, 0.3, 0.05)), solve)
     assert outcome.status is Status.CONVERGED
     assert solve.asked == [1.0, 0.3, 0.1]  # 0.05 lies beyond the target
     assert stage.law == LAW
-    assert walk(Start(values=()), LAW, Guarded(1.0))[1].law == LAW
+    assert walked(Start(values=()), Guarded(1.0))[1].law == LAW
 
 
 def test_a_natural_continuation_ends_where_a_stage_fails() -> None:
-    outcome, stage = walk(Start(values=(1.0, 0.9, 0.2, 0.15)), LAW, Guarded(0.5))
+    outcome, stage = walked(Start(values=(1.0, 0.9, 0.2, 0.15)), Guarded(0.5))
     assert (outcome.status, stage.value) == (Status.STAGNATED, 0.2)
 
 
 def test_an_adaptive_step_doubles_where_it_is_easy() -> None:
     """A decade in log n: 1/8, then 1/8 + 1/4, then 1/8 + 1/4 + 1/2, then the rest."""
     solve = Guarded(10.0)
-    walk(Start(values=(1.0, 10.0**-0.125), adaptive=True), LAW, solve)
+    walked(Start(values=(1.0, 10.0**-0.125), adaptive=True), solve)
     np.testing.assert_allclose(solve.asked, 10.0 ** -np.array([0.0, 0.125, 0.375, 0.875, 1.0]))
     hard = Guarded(10.0, iterations=20)
-    walk(Start(values=(1.0, 10.0**-0.25), adaptive=True), LAW, hard)
+    walked(Start(values=(1.0, 10.0**-0.25), adaptive=True), hard)
     np.testing.assert_allclose(hard.asked, 10.0 ** -np.array([0.0, 0.25, 0.5, 0.75, 1.0]))
 
 
 def test_an_adaptive_step_is_halved_where_it_fails() -> None:
     solve = Guarded(0.3 * np.log(10.0), iterations=20)
-    outcome, stage = walk(Start(values=(1.0,), adaptive=True), LAW, solve)
+    outcome, stage = walked(Start(values=(1.0,), adaptive=True), solve)
     np.testing.assert_allclose(solve.asked, 10.0 ** -np.array([0.0, 1.0, 0.5, 0.25, 0.5, 0.75, 1.0]))
     assert (outcome.status, stage.law) == (Status.CONVERGED, LAW)
 
 
 def test_an_adaptive_continuation_that_cannot_go_on_says_where_it_got() -> None:
     class Wall(Guarded):
-        def __call__(self, stage: Stage, last: bool) -> Outcome:
-            outcome = super().__call__(stage, last)
+        def __call__(self, stage: Stage) -> Outcome:
+            outcome = super().__call__(stage)
             return outcome if stage.value > 0.2 else Outcome(Status.DIVERGED, "too steep", np.zeros(1), 1.0, ())
 
-    outcome, stage = walk(Start(values=(1.0, 0.5), adaptive=True), LAW, Wall(10.0))
+    outcome, stage = walked(Start(values=(1.0, 0.5), adaptive=True), Wall(10.0))
     assert outcome.status is Status.DIVERGED
     assert 0.19 < stage.value <= 0.2
     assert outcome.detail.startswith("the adaptive continuation got from 1 to 0.20")
@@ -160,7 +180,8 @@ def test_every_continuation_leads_to_the_same_state(start: Start, natural: dict[
 
 def test_a_marched_scene_begins_where_its_start_ended() -> None:
     start = Start(by="load", values=(1e-4, 1e-2), adaptive=True)
-    row = march(setup(StirringTool(nodes=COARSE, horizon=1e-4, increment=1e-4), 0.3, start=start)).summary
+    time = TimeSteps(horizon=1e-4, increment=1e-4)
+    row = march(setup(StirringTool(nodes=COARSE), 0.3, time=time, start=start)).summary
     assert (row["status"], row["increments"], row["factorizations"]) == ("converged", 1, 0)
 
 
@@ -174,8 +195,8 @@ def test_the_load_includes_the_force_on_the_body() -> None:
 
 def test_a_start_that_cannot_get_there_is_a_row_with_its_place() -> None:
     start = Start(adaptive=True, smallest=0.5, iterations=2)
-    scene = StirringTool(nodes=COARSE, horizon=1e-4, increment=1e-4)
-    row = march(setup(scene, 0.1324, start=start, budget=Budget(iterations=50), starter=Newton())).summary
+    parts = {"time": TimeSteps(horizon=1e-4), "start": start, "budget": Budget(iterations=50), "starter": Newton()}
+    row = march(setup(StirringTool(nodes=COARSE), 0.1324, **parts)).summary
     assert row["status"] == "budget spent"
     assert "on the way to the first state, at index = 0." in row["message"]
     assert "the adaptive continuation got from 1 to" in row["message"]

@@ -11,13 +11,12 @@ from nlsolve_discretizers import MovingLeastSquares
 from nlsolve_laws import NortonHoff, PowerLaw
 from nlsolve_linear.superlu import SuperLU
 from nlsolve_rules.refresh import PoorContraction
-from nlsolve_scenes import Cavity, Manufactured
+from nlsolve_scenes import Cavity, Manufactured, StirringTool
 from nlsolve_solvers.homotopy import AsymptoticNumericalMethod
 from nlsolve_solvers.modified_newton import ModifiedNewton
-from pydantic import ValidationError
 
 from nlsolve.flow.momentum import Convection, Flow, Inertia
-from nlsolve.plugin import ConstitutiveLaw, Scene
+from nlsolve.plugin import ConstitutiveLaw, FlowScene, Misfit, NodeMotion, Physics, TimeSteps
 from nlsolve.series import Array
 from nlsolve.solving.simulate import run_case as march
 from nlsolve.testing import check_problem
@@ -37,7 +36,7 @@ TERMS: dict[str, dict[str, Any]] = {
         "inertia": Inertia(DENSITY / 0.01, 0.7 * EXACT),
         "penalty_modulus": 50.0,
         "pressure": np.linspace(-1.0, 1.0, len(OPERATORS.volumetric.points)),
-        "body_force": SCENE.body_force(CLOUD.nodes[CLOUD.interior], VISCOUS),
+        "body_force": SCENE.body_force(CLOUD.nodes[CLOUD.interior], VISCOUS, Physics()),
     },
 }
 
@@ -89,9 +88,9 @@ class TestOrderOfConvergence:
     least = 1.8
     least_of_pressure = 1.6
 
-    def order(self, law: ConstitutiveLaw, spacings: tuple[float, float], **fields: Any) -> float:
+    def order(self, law: ConstitutiveLaw, physics: Physics, spacings: tuple[float, float], **fields: Any) -> float:
         rows = [
-            march(setup(Manufactured(spacing=h, convection=True, **fields), law=law, linear=SuperLU())).summary
+            march(setup(Manufactured(spacing=h, **fields), law=law, physics=physics, linear=SuperLU())).summary
             for h in spacings
         ]
         assert all(row["status"] == "converged" for row in rows), [row["message"] for row in rows]
@@ -101,13 +100,13 @@ class TestOrderOfConvergence:
 
     @pytest.mark.parametrize(("law", "density"), [(VISCOUS, 5.0), (PowerLaw(index=0.5), 100.0)])
     def test_without_a_pressure(self, law: ConstitutiveLaw, density: float) -> None:
-        assert self.order(law, (0.1, 0.05), density=density, jitter=0.2) >= self.least
+        physics = Physics(convection=True, density=density)
+        assert self.order(law, physics, (0.1, 0.05), jitter=0.2) >= self.least
 
     @pytest.mark.parametrize("density", [5.0, 50.0])
     def test_with_a_pressure(self, density: float) -> None:
-        volumetric: dict[str, Any] = {"penalty": 1e3, "divergence": 1e-7}
-        order = self.order(VISCOUS, (0.1, 0.035), density=density, nodes="scattered", **volumetric)
-        assert order >= self.least_of_pressure
+        physics = Physics(convection=True, density=density, penalty=1e3, divergence_tolerance=1e-7)
+        assert self.order(VISCOUS, physics, (0.1, 0.035), nodes="scattered") >= self.least_of_pressure
 
 
 @pytest.mark.parametrize("solver", [ModifiedNewton(), AsymptoticNumericalMethod()], ids=lambda solver: solver.kind)
@@ -115,12 +114,11 @@ def test_inertia_and_convection_march_to_the_steady_state(solver: Any) -> None:
     """From the quasi-static state at Re = 40, in time steps of L/U, all methods find the same steady flow: the exact
     one to the error of the nodes, which no time step changes.
     """
-    scene = Manufactured(
-        spacing=0.1, density=20.0, convection=True, inertia=True, horizon=5.0, increment=0.5, nodes="scattered"
-    )
-    parts: dict[str, Any] = {"law": VISCOUS, "solver": solver, "refresh": PoorContraction(), "linear": PLAIN}
-    marched = march(setup(scene, **parts)).summary
-    steady = march(setup(scene.with_(horizon=None), law=VISCOUS)).summary
+    scene = Manufactured(spacing=0.1, nodes="scattered")
+    equations: dict[str, Any] = {"law": VISCOUS, "physics": Physics(density=20.0, convection=True, inertia=True)}
+    method: dict[str, Any] = {"solver": solver, "refresh": PoorContraction(), "linear": PLAIN}
+    marched = march(setup(scene, time=TimeSteps(horizon=5.0, increment=0.5), **equations, **method)).summary
+    steady = march(setup(scene, **equations)).summary
     assert marched["status"] == steady["status"] == "converged", marched["message"]
     assert marched["velocity_error"] == pytest.approx(steady["velocity_error"], rel=1e-4)
     assert marched["velocity_error"] < 0.01
@@ -163,8 +161,9 @@ PLACES, V_100 = np.array(
 ).T
 
 
-def velocity(scene: Scene, x: Array, y: Array) -> Array:
-    case = setup(scene, law=VISCOUS, linear=SuperLU())
+def velocity(scene: FlowScene, density: float, x: Array, y: Array) -> Array:
+    physics = Physics(convection=True, density=density, penalty=1000.0, divergence_tolerance=1e-6)
+    case = setup(scene, law=VISCOUS, physics=physics, linear=SuperLU())
     record = march(case)
     assert record.summary["status"] == "converged", record.summary["message"]
     values = case.discretizer.values(record.fields[["x", "y"]].to_numpy(), np.stack([x, y], axis=1))
@@ -173,22 +172,23 @@ def velocity(scene: Scene, x: Array, y: Array) -> Array:
 
 def test_cavity_at_reynolds_100() -> None:
     """Within 1 % of the lid's speed in u, 1.5 % in v, on 2300 nodes."""
-    scene = Cavity(convection=True, density=100.0, spacing=1 / 40, grading=0.6)
-    assert scene.reynolds(VISCOUS) == pytest.approx(100.0)
+    scene = Cavity(spacing=1 / 40, grading=0.6)
+    assert scene.reynolds(VISCOUS, 100.0) == pytest.approx(100.0)
     half = np.full_like(HEIGHTS, 0.5)
     x, y = np.concatenate([half, PLACES]), np.concatenate([HEIGHTS, np.full_like(PLACES, 0.5)])
-    found = velocity(scene, x, y)
+    found = velocity(scene, 100.0, x, y)
     np.testing.assert_allclose(found[: len(half), 0], U_100, atol=0.01)
     np.testing.assert_allclose(found[len(half) :, 1], V_100, atol=0.015)
 
 
 def test_cavity_at_reynolds_400() -> None:
     """Within 1.5 % of the lid's speed on 1600 nodes."""
-    scene = Cavity(convection=True, density=400.0, spacing=1 / 32, grading=0.5)
-    found = velocity(scene, np.full_like(HEIGHTS, 0.5), HEIGHTS)
+    scene = Cavity(spacing=1 / 32, grading=0.5)
+    found = velocity(scene, 400.0, np.full_like(HEIGHTS, 0.5), HEIGHTS)
     np.testing.assert_allclose(found[:, 0], U_400, atol=0.015)
 
 
 def test_nodes_that_move_with_the_material_carry_it_already() -> None:
-    with pytest.raises(ValidationError, match=r'convection = true: .* use motion_of_nodes = "fixed"'):
-        Cavity(convection=True, motion_of_nodes="lagrangian")
+    case = setup(StirringTool(), physics=Physics(convection=True), motion=NodeMotion(nodes="lagrangian"))
+    with pytest.raises(Misfit, match=r'physics\.convection: nodes .* carry it already; use motion\.nodes = "fixed"'):
+        case.scene.check(case)

@@ -21,10 +21,10 @@ from scipy.sparse import csr_array
 from nlsolve import SolveError, Status
 from nlsolve.flow.incompressibility import DEPTH, pressure_mixing
 from nlsolve.flow.momentum import Flow
-from nlsolve.plugin import Discretizer, Operators, PointOperators, Scene
+from nlsolve.plugin import Discretizer, FlowScene, Misfit, NodeMotion, Operators, Physics, PointOperators, TimeSteps
 from nlsolve.series import Array
 from nlsolve.solving.simulate import run_case as march
-from nlsolve.solving.stopping import Budget, StoppingTest
+from nlsolve.solving.stopping import StoppingTest
 
 # Mixing.
 
@@ -79,31 +79,34 @@ DISCRETIZERS = {
 }
 
 
-def tool(motion: str, penalty: float = 100.0, divergence: float | None = ASKED, **fields: Any) -> Scene:
-    return StirringTool.model_validate(
-        {"motion": motion, "nodes": Rings(spacing=0.5), "penalty": penalty, "divergence": divergence, **fields}
-    )
+SPIN, ORBIT = (
+    StirringTool.model_validate({"motion": motion, "nodes": Rings(spacing=0.5)}) for motion in ("spin", "orbit")
+)
 
 
-def solved(scene: Scene, **parts: Any) -> tuple[dict[str, Any], Array]:
+def iterated(penalty: float = 100.0, **fields: Any) -> Physics:
+    return Physics(penalty=penalty, divergence_tolerance=ASKED, **fields)
+
+
+def solved(scene: FlowScene, physics: Physics, **parts: Any) -> tuple[dict[str, Any], Array]:
     """The row of a case that must converge, and its nodal velocities."""
-    record = march(setup(scene, **{"stop": TIGHT, **parts}))
+    record = march(setup(scene, physics=physics, **{"stop": TIGHT, **parts}))
     assert record.summary["status"] == "converged", record.summary["message"]
     return record.summary, record.fields[["u", "v"]].to_numpy()
 
 
 @pytest.mark.parametrize("discretizer", DISCRETIZERS.values(), ids=DISCRETIZERS)
-@pytest.mark.parametrize("motion", ["spin", "orbit"])
+@pytest.mark.parametrize("scene", [SPIN, ORBIT], ids=["spin", "orbit"])
 def test_the_divergence_asked_for_is_reached_and_the_flow_is_that_of_a_huge_penalty(
-    motion: str, discretizer: Discretizer
+    scene: FlowScene, discretizer: Discretizer
 ) -> None:
-    row, velocity = solved(tool(motion), discretizer=discretizer)
+    row, velocity = solved(scene, iterated(), discretizer=discretizer)
     assert row["divergence"] <= ASKED
     assert 1 <= row["pressure_iterations"] <= 20
     assert row["increments"] == 1
-    stiff, expected = solved(tool(motion, 1e7, None), discretizer=discretizer)
+    stiff, expected = solved(scene, Physics(penalty=1e7), discretizer=discretizer)
     assert stiff["pressure_iterations"] is None
-    weak, loose = solved(tool(motion, 100.0, None), discretizer=discretizer)
+    weak, loose = solved(scene, Physics(penalty=100.0), discretizer=discretizer)
     size = np.linalg.norm(expected)
     assert np.linalg.norm(velocity - expected) < 1e-5 * size
     assert np.linalg.norm(loose - expected) > 1e-4 * size  # what iterating the pressure was for
@@ -113,7 +116,8 @@ def test_the_divergence_asked_for_is_reached_and_the_flow_is_that_of_a_huge_pena
 def test_a_larger_penalty_takes_fewer_iterations() -> None:
     triangles = LinearTriangles()
     counts = [
-        solved(tool("orbit", penalty), discretizer=triangles)[0]["pressure_iterations"] for penalty in (10.0, 1e2, 1e4)
+        solved(ORBIT, iterated(penalty), discretizer=triangles)[0]["pressure_iterations"]
+        for penalty in (10.0, 1e2, 1e4)
     ]
     assert counts[0] > counts[1] > counts[2] >= 1
 
@@ -122,11 +126,11 @@ def test_a_larger_penalty_takes_fewer_iterations() -> None:
 def test_a_kept_tangent_serves_all_iterations_of_the_pressure(name: str) -> None:
     """The pressure only moves the right-hand side: Newton pays a factorisation each time, a kept tangent few in all."""
     discretizer = DISCRETIZERS[name]
-    newton, expected = solved(tool("orbit"), discretizer=discretizer)
+    newton, expected = solved(ORBIT, iterated(), discretizer=discretizer)
     assert newton["tangents"] > newton["pressure_iterations"]
     others = ((ModifiedNewton(), PoorContraction(), 2), (AsymptoticNumericalMethod(), RangeUnderOne(), 6))
     for solver, refresh, most in others:
-        kept, velocity = solved(tool("orbit"), discretizer=discretizer, solver=solver, refresh=refresh)
+        kept, velocity = solved(ORBIT, iterated(), discretizer=discretizer, solver=solver, refresh=refresh)
         assert kept["tangents"] <= most < kept["pressure_iterations"]
         assert kept["factorizations"] == kept["tangents"]
         assert kept["triangular_solves"] > kept["pressure_iterations"]
@@ -136,10 +140,11 @@ def test_a_kept_tangent_serves_all_iterations_of_the_pressure(name: str) -> None
 def test_a_marched_pressure_is_iterated_in_every_increment() -> None:
     """The pressure of the increment before is where the next one begins."""
     triangles = LinearTriangles()
-    row, _ = solved(tool("orbit", horizon=3e-4, increment=1e-4), discretizer=triangles)
+    time = TimeSteps(horizon=3e-4, increment=1e-4)
+    row, _ = solved(ORBIT, iterated(), time=time, discretizer=triangles)
     assert row["increments"] == 3
     assert row["divergence"] <= ASKED
-    first, _ = solved(tool("orbit"), discretizer=triangles)
+    first, _ = solved(ORBIT, iterated(), discretizer=triangles)
     assert row["pressure_iterations"] < 4 * first["pressure_iterations"]
 
 
@@ -147,7 +152,7 @@ def test_a_marched_pressure_is_iterated_in_every_increment() -> None:
 
 
 def test_pressures_used_up_are_a_sentence_with_what_was_reached_and_asked() -> None:
-    row = march(setup(tool("orbit"), stop=TIGHT, budget=Budget(pressures=1))).summary
+    row = march(setup(ORBIT, physics=iterated(pressure_iterations=1), stop=TIGHT)).summary
     assert row["status"] == "budget spent"
     assert row["pressure_iterations"] == 1
     assert row["divergence"] > ASKED
@@ -157,13 +162,14 @@ def test_pressures_used_up_are_a_sentence_with_what_was_reached_and_asked() -> N
 
 @pytest.mark.parametrize("penalty", [{}, {"penalty": 0.0}])
 def test_a_pressure_is_iterated_with_a_penalty_only(penalty: dict[str, float]) -> None:
-    with pytest.raises(ValidationError, match=r"divergence = 1e-08: .*; set penalty > 0"):
-        StirringTool.model_validate({"divergence": 1e-8, **penalty})
+    with pytest.raises(ValidationError, match=r"divergence_tolerance = 1e-08: .*; set penalty > 0"):
+        Physics(divergence_tolerance=1e-8, **penalty)
 
 
 def test_nodes_that_move_are_not_carried_twice() -> None:
-    with pytest.raises(ValidationError, match='carry it already; use motion_of_nodes = "fixed"'):
-        StirringTool(convection=True, motion_of_nodes="lagrangian")
+    case = setup(SPIN, physics=Physics(convection=True), motion=NodeMotion(nodes="lagrangian"))
+    with pytest.raises(Misfit, match=r'carry it already; use motion\.nodes = "fixed"'):
+        case.scene.check(case)
 
 
 # Units of λ.
@@ -171,24 +177,24 @@ def test_nodes_that_move_are_not_carried_twice() -> None:
 
 def test_units_of_the_penalty() -> None:
     """λ = c μ(reference rate), c μ(ε̄²) point by point, or c."""
-    law, rates = PowerLaw(index=0.5, regularization=0.0), np.array([1.0, 1e4, 1e6])
+    law, rate, rates = PowerLaw(index=0.5, regularization=0.0), StirringTool().reference_rate, np.array([1.0, 1e4, 1e6])
     reference, local, absolute = (
-        StirringTool.model_validate({"penalty": 50.0, "penalty_unit": unit}).penalty_modulus(law, rates)
+        Physics.model_validate({"penalty": 50.0, "penalty_unit": unit}).penalty_modulus(law, rate, rates)
         for unit in ("reference", "local", "absolute")
     )
     at_reference = 164.76 / 3.0 * 100.0**-0.5  # μ = ⅓ k T^A ε̄^(n−1) at ω = 100 rad/s
     assert reference == pytest.approx(50.0 * at_reference, rel=1e-4)
     np.testing.assert_allclose(local, 50.0 * at_reference * np.array([10.0, 1.0, 10.0**-0.5]), rtol=1e-4)
     assert absolute == 50.0
-    assert StirringTool().penalty_modulus(law, rates) == 0.0
+    assert Physics().penalty_modulus(law, rate, rates) == 0.0
 
 
 @pytest.mark.parametrize(
     ("unit", "penalty"), [("reference", 100.0), ("local", 100.0), ("absolute", 100.0 * 164.76 / 3.0 / 10.0)]
 )
 def test_the_unit_does_not_matter_once_the_pressure_is_iterated(unit: str, penalty: float) -> None:
-    row, velocity = solved(tool("orbit", penalty, penalty_unit=unit))
-    expected = solved(tool("orbit"))[1]
+    row, velocity = solved(ORBIT, iterated(penalty, penalty_unit=unit))
+    expected = solved(ORBIT, iterated())[1]
     assert row["divergence"] <= ASKED
     np.testing.assert_allclose(velocity, expected, rtol=0.0, atol=1e-5 * np.abs(expected).max())
 
@@ -217,8 +223,8 @@ def test_a_singular_matrix_has_no_factors_to_ask() -> None:
 
 def test_the_condition_grows_like_the_penalty_and_is_the_same_in_every_run() -> None:
     """What the iterated pressure spares the linear solver."""
-    first, again = (solved(tool("orbit"))[0]["condition"] for _ in range(2))
-    stiff = solved(tool("orbit", 1e6, None))[0]["condition"]
+    first, again = (solved(ORBIT, iterated())[0]["condition"] for _ in range(2))
+    stiff = solved(ORBIT, Physics(penalty=1e6))[0]["condition"]
     assert np.isfinite(first)
     assert first == again
     assert 1e2 < stiff / first < 1e6
@@ -238,7 +244,8 @@ class TestNoLocking:
     def test_spin(self, name: str) -> None:
         found = [
             solved(
-                StirringTool(nodes=self.nodes, penalty=penalty),
+                StirringTool(nodes=self.nodes),
+                Physics(penalty=penalty),
                 index=1.0,
                 discretizer=DISCRETIZERS[name],
                 stop=StoppingTest(tolerance=1e-9),

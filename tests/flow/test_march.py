@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import Any
 
 import agreement
@@ -24,7 +25,8 @@ from pydantic import ValidationError
 
 from nlsolve import SolveError, Status
 from nlsolve.flow.continuation import Start
-from nlsolve.plugin import Cloud, Operators, Step
+from nlsolve.flow.state import FlowParts
+from nlsolve.plugin import Cloud, NodeMotion, Operators, Physics, Recording, Step, TimeSteps
 from nlsolve.results.columns import FIELDS, RUNS, STEPS
 from nlsolve.solving.simulate import Progress, Record
 from nlsolve.solving.simulate import run_case as march
@@ -34,13 +36,22 @@ COARSE = Rings(spacing=0.5)
 DT = 1e-4
 
 
-def marching(steps: int, **fields: Any) -> StirringTool:
-    given: dict[str, Any] = {"nodes": COARSE, "horizon": steps * DT, "increment": DT, "motion_of_nodes": "lagrangian"}
-    return StirringTool(**(given | fields))
+FIXED = NodeMotion()
 
 
-def times(steps: int) -> tuple[float, ...]:
-    return tuple(k * DT for k in range(steps + 1))
+def marching(steps: int, index: float = 0.5, increment: float = DT, **parts: Any) -> FlowParts:
+    """A spin marched for some increments, on nodes that move with the material but for the parts given."""
+    time = TimeSteps(horizon=steps * increment, increment=increment)
+    moving = {"time": time, "motion": NodeMotion(nodes="lagrangian")}
+    return setup(StirringTool(nodes=COARSE), index, **(moving | parts))
+
+
+def times(steps: int, increment: float = DT) -> tuple[float, ...]:
+    return tuple(k * increment for k in range(steps + 1))
+
+
+def every(steps: int, increment: float = DT) -> Recording:
+    return Recording(times=times(steps, increment))
 
 
 def field(record: Record, time: float) -> pd.DataFrame:
@@ -66,7 +77,7 @@ def test_steady_spin_converges(index: float) -> None:
 
 
 def test_columns_are_those_documented() -> None:
-    record = march(setup(marching(2, probe=(2.0, 0.0))))
+    record = march(marching(2, record=Recording(probe=(2.0, 0.0))))
     assert set(record.summary) <= set(RUNS)
     assert list(record.steps.columns) == [column for column in STEPS if column != "case"]
     assert set(record.fields.columns) == set(FIELDS) - {"case"}
@@ -101,30 +112,31 @@ class Watched(Newton):
 BEGUN: list[np.ndarray] = []
 
 
-def guesses(scene: StirringTool, **start: Any) -> list[np.ndarray]:
+def guesses(case: FlowParts, **start: Any) -> list[np.ndarray]:
     """Where the case's own method began."""
     BEGUN.clear()
-    assert march(setup(scene, solver=Watched(), start=Start(**start))).summary["status"] == "converged"
+    watched = replace(case, solver=Watched(), start=Start(**start))
+    assert march(watched).summary["status"] == "converged"
     return list(BEGUN)
 
 
 def test_a_perturbation_has_its_size_relative_to_the_velocity() -> None:
     """‖guess − undisturbed guess‖₂ = ε ‖V‖₂: after continuation the state it led to, from rest the walls' velocity."""
-    scene = StirringTool(nodes=COARSE)
+    case = setup(StirringTool(nodes=COARSE))
     wall = 150.0 * np.sqrt(18)  # 18 nodes on the tool, 150 mm/s each
-    (rest,), (moved,) = guesses(scene, values=()), guesses(scene, values=(), perturbation=0.03, seed=1)
+    (rest,), (moved,) = guesses(case, values=()), guesses(case, values=(), perturbation=0.03, seed=1)
     np.testing.assert_array_equal(rest, 0.0)
     assert np.linalg.norm(moved) == pytest.approx(0.03 * wall, rel=1e-12)
-    (plain,), (moved,) = guesses(scene, values=(1.0,)), guesses(scene, values=(1.0,), perturbation=0.03)
+    (plain,), (moved,) = guesses(case, values=(1.0,)), guesses(case, values=(1.0,), perturbation=0.03)
     whole = np.hypot(wall, np.linalg.norm(plain))
     assert np.linalg.norm(moved - plain) == pytest.approx(0.03 * whole, rel=1e-12)
 
 
 def test_a_perturbation_follows_from_its_seed_and_the_increment() -> None:
-    scene = marching(3, motion_of_nodes="fixed")
-    still = guesses(scene)
-    one, again = (guesses(scene, perturbation=1e-3, seed=1) for _ in range(2))
-    other = guesses(scene, perturbation=1e-3, seed=2)
+    case = marching(3, motion=FIXED)
+    still = guesses(case)
+    one, again = (guesses(case, perturbation=1e-3, seed=1) for _ in range(2))
+    other = guesses(case, perturbation=1e-3, seed=2)
     np.testing.assert_array_equal(one, again)
     changes = [guess - plain for guess, plain in zip(one, still, strict=True)]
     assert len(changes) == 3
@@ -133,8 +145,8 @@ def test_a_perturbation_follows_from_its_seed_and_the_increment() -> None:
 
 
 def test_a_perturbation_changes_the_way_and_not_the_solution() -> None:
-    plain = march(setup(marching(2, motion_of_nodes="fixed"), 0.3, record=times(2)))
-    moved = march(setup(marching(2, motion_of_nodes="fixed"), 0.3, record=times(2), start=Start(perturbation=0.01)))
+    plain = march(marching(2, 0.3, motion=FIXED, record=every(2)))
+    moved = march(marching(2, 0.3, motion=FIXED, record=every(2), start=Start(perturbation=0.01)))
     assert plain.summary["factorizations"] == 0
     assert moved.summary["factorizations"] > 0
     assert plain.summary["start_factorizations"] == moved.summary["start_factorizations"]
@@ -215,7 +227,7 @@ def test_torque_of_a_fine_cloud_is_the_exact_one() -> None:
 
 def test_torque_does_not_depend_on_the_sign_of_the_pressure() -> None:
     """A penalty adds a pressure, and a pressure on a circle has no moment."""
-    with_penalty = march(setup(StirringTool(nodes=COARSE, penalty=100.0), 1.0)).summary
+    with_penalty = march(setup(StirringTool(nodes=COARSE), 1.0, physics=Physics(penalty=100.0))).summary
     without = march(setup(StirringTool(nodes=COARSE), 1.0)).summary
     assert with_penalty["torque"] == pytest.approx(without["torque"], rel=1e-2)
     assert abs(with_penalty["force_x"]) < 1e-2 * without["torque"] / 1.5
@@ -227,10 +239,10 @@ def test_torque_does_not_depend_on_the_sign_of_the_pressure() -> None:
 def test_homotopy_and_newton_march_the_same_way_at_every_increment() -> None:
     """Lagrangian nodes, ten increments: velocities agree to 1e-6 of the tool speed, nodes to what that moves them."""
     steps = 10
-    common: dict[str, Any] = {"stop": StoppingTest(tolerance=1e-9), "record": times(steps)}
-    newton = march(setup(marching(steps), 0.3, **common))
-    anm = march(setup(marching(steps), 0.3, solver=AsymptoticNumericalMethod(), refresh=RangeUnderOne(), **common))
-    modified = march(setup(marching(steps), 0.3, solver=ModifiedNewton(), refresh=PoorContraction(), **common))
+    common: dict[str, Any] = {"stop": StoppingTest(tolerance=1e-9), "record": every(steps)}
+    newton = march(marching(steps, 0.3, **common))
+    anm = march(marching(steps, 0.3, solver=AsymptoticNumericalMethod(), refresh=RangeUnderOne(), **common))
+    modified = march(marching(steps, 0.3, solver=ModifiedNewton(), refresh=PoorContraction(), **common))
     assert newton.summary["status"] == anm.summary["status"] == modified.summary["status"] == "converged"
     for time in times(steps):
         reference = field(newton, time)
@@ -246,7 +258,7 @@ def test_homotopy_and_newton_march_the_same_way_at_every_increment() -> None:
 
 def test_tool_nodes_turn_by_exactly_omega_t() -> None:
     steps = 5
-    record = march(setup(marching(steps), record=times(steps)))
+    record = march(marching(steps, record=every(steps)))
     for time in times(steps):
         tool = field(record, time).query("boundary == 'tool'")
         angle = 100.0 * time
@@ -261,9 +273,7 @@ def test_tool_nodes_turn_by_exactly_omega_t() -> None:
 def test_inner_nodes_move_by_a_second_order_rule() -> None:
     """Adams-Bashforth: x_{k+1} = x_k + Δt (3 v_k − v_{k−1})/2, read off the recorded places and velocities."""
     steps = 4
-    record = march(
-        setup(marching(steps, increment=1e-3, horizon=steps * 1e-3), record=tuple(k * 1e-3 for k in range(5)))
-    )
+    record = march(marching(steps, increment=1e-3, record=every(steps, 1e-3)))
     frames = [part for _, part in record.fields.groupby("time")]
     assert len(frames) == steps + 1
     x = [part.query("boundary == ''")[["x", "y"]].to_numpy() for part in frames]
@@ -274,7 +284,7 @@ def test_inner_nodes_move_by_a_second_order_rule() -> None:
 
 
 def test_fixed_nodes_stay_and_the_quasi_static_state_with_them() -> None:
-    record = march(setup(marching(3, motion_of_nodes="fixed"), record=times(3)))
+    record = march(marching(3, motion=FIXED, record=every(3)))
     frame = record.fields
     np.testing.assert_array_equal(frame[["x", "y"]].to_numpy(), frame[["x0", "y0"]].to_numpy())
     assert record.summary["increments"] == 3
@@ -283,9 +293,9 @@ def test_fixed_nodes_stay_and_the_quasi_static_state_with_them() -> None:
 
 def test_inertia_is_negligible_but_there() -> None:
     """Re ~ 1e-4 or less: the field stays put, and the solve is not the quasi-static one."""
-    still = march(setup(marching(2, motion_of_nodes="fixed"), 1.0, record=times(2)))
-    heavy = march(setup(marching(2, motion_of_nodes="fixed", inertia=True, density=1.0), 1.0, record=times(2)))
-    light = march(setup(marching(2, motion_of_nodes="fixed", inertia=True), 1.0, record=times(2)))
+    still = march(marching(2, 1.0, motion=FIXED, record=every(2)))
+    heavy = march(marching(2, 1.0, physics=Physics(inertia=True, density=1.0), motion=FIXED, record=every(2)))
+    light = march(marching(2, 1.0, physics=Physics(inertia=True), motion=FIXED, record=every(2)))
     u, w = field(still, 2 * DT), field(light, 2 * DT)
     assert np.abs(u["u"].to_numpy() - w["u"].to_numpy()).max() < 1e-6 * 150.0
     assert heavy.summary["status"] == "converged"
@@ -293,7 +303,7 @@ def test_inertia_is_negligible_but_there() -> None:
 
 def test_probe_is_the_nearest_inner_node_followed_in_time() -> None:
     steps = 4
-    record = march(setup(marching(steps, probe=(1.4, 0.1)), record=times(steps)))
+    record = march(marching(steps, record=Recording(times=times(steps), probe=(1.4, 0.1))))
     accepted = record.steps[record.steps["accepted"]]
     assert len(accepted) == steps
     first = field(record, 0.0)
@@ -307,7 +317,7 @@ def test_probe_is_the_nearest_inner_node_followed_in_time() -> None:
 
 def test_one_step_of_every_increment_is_accepted_and_all_are_told() -> None:
     heard: list[Progress] = []
-    record = march(setup(marching(3)), heard.append)
+    record = march(marching(3), heard.append)
     assert [progress.increment for progress in heard] == [1, 2, 3]
     assert record.steps.groupby("increment")["accepted"].sum().tolist() == [1, 1, 1]
     iterations = record.steps.groupby("increment")["step"].max().sum()
@@ -319,7 +329,7 @@ def test_one_step_of_every_increment_is_accepted_and_all_are_told() -> None:
 
 
 def test_a_tangent_that_is_never_renewed_is_valid_to_the_end() -> None:
-    record = march(setup(marching(4), 1.0, solver=ModifiedNewton(), refresh=Never()))
+    record = march(marching(4, 1.0, solver=ModifiedNewton(), refresh=Never()))
     assert record.summary["tangents"] == 1
     assert record.summary["factorizations"] == 1
     assert record.summary["validity_time"] == pytest.approx(4 * DT)
@@ -327,7 +337,7 @@ def test_a_tangent_that_is_never_renewed_is_valid_to_the_end() -> None:
 
 def test_validity_ends_with_the_last_increment_the_first_tangent_served_alone() -> None:
     """Renewed after every m iterations: in the increment in which that falls the first tangent no longer serves."""
-    record = march(setup(marching(6), 0.5, solver=ModifiedNewton(), refresh=EveryM(m=9)))
+    record = march(marching(6, solver=ModifiedNewton(), refresh=EveryM(m=9)))
     steps = record.steps
     renewed = int(steps.loc[steps["tangents"] > 1, "increment"].min())
     assert renewed > 1
@@ -336,7 +346,7 @@ def test_validity_ends_with_the_last_increment_the_first_tangent_served_alone() 
 
 
 def test_a_tangent_renewed_in_the_first_increment_was_valid_for_none() -> None:
-    record = march(setup(marching(3), 0.3, solver=Newton(), refresh=EveryIteration()))
+    record = march(marching(3, 0.3, solver=Newton(), refresh=EveryIteration()))
     assert record.steps.query("increment == 1")["tangents"].max() > 1
     assert record.summary["validity_time"] == 0.0
 
@@ -357,7 +367,7 @@ class CollapsesAfter(MovingLeastSquares):
 
 
 def test_a_cloud_that_collapses_leaves_the_increments_done() -> None:
-    record = march(setup(marching(6), discretizer=CollapsesAfter(count=2)))
+    record = march(marching(6, discretizer=CollapsesAfter(count=2)))
     assert record.summary["status"] == "bad cloud"
     assert "two nodes met" in record.summary["message"]
     assert record.summary["increments"] == 2
@@ -366,13 +376,13 @@ def test_a_cloud_that_collapses_leaves_the_increments_done() -> None:
 
 
 def test_the_time_reached_is_that_of_the_last_increment_solved() -> None:
-    record = march(setup(marching(6), discretizer=CollapsesAfter(count=2)))
+    record = march(marching(6, discretizer=CollapsesAfter(count=2)))
     assert record.summary["time"] == pytest.approx(2 * DT)
 
 
 def test_validity_does_not_reach_beyond_what_was_solved() -> None:
     parts = {"solver": ModifiedNewton(), "refresh": Never(), "discretizer": CollapsesAfter(count=2)}
-    record = march(setup(marching(6), 1.0, **parts))
+    record = march(marching(6, 1.0, **parts))
     assert record.summary["validity_time"] == pytest.approx(2 * DT)
 
 
@@ -380,8 +390,8 @@ def test_an_increment_that_does_not_converge_ends_the_march_with_its_rows() -> N
     """A budget of one chord iteration is too little once the nodes have moved."""
     stop = StoppingTest(tolerance=1e-10)
     record = march(
-        setup(
-            marching(5),
+        marching(
+            5,
             0.3,
             stop=stop,
             budget=Budget(iterations=60),
@@ -390,7 +400,7 @@ def test_an_increment_that_does_not_converge_ends_the_march_with_its_rows() -> N
         )
     )
     assert record.summary["status"] == "converged"
-    short = march(setup(marching(5), 0.3, stop=stop, start=Start(tolerance=1e-2), budget=Budget(iterations=2)))
+    short = march(marching(5, 0.3, stop=stop, start=Start(tolerance=1e-2), budget=Budget(iterations=2)))
     assert short.summary["status"] == "budget spent"
     assert "iterations allowed" in short.summary["message"]
     assert short.summary["increments"] < 5
@@ -400,7 +410,7 @@ def test_an_increment_that_does_not_converge_ends_the_march_with_its_rows() -> N
 
 
 def test_a_first_state_that_fails_says_where() -> None:
-    record = march(setup(marching(2), 0.1324, budget=Budget(iterations=1)))
+    record = march(marching(2, 0.1324, budget=Budget(iterations=1)))
     assert record.summary["status"] == "budget spent"
     assert "on the way to the first state" in record.summary["message"]
     assert record.summary["increments"] == 0

@@ -18,7 +18,7 @@ from nlsolve_solvers import Newton
 from nlsolve import Status
 from nlsolve.contracts.continuum.law import stress
 from nlsolve.flow.momentum import Flow, Inertia, node_major
-from nlsolve.plugin import PointOperators
+from nlsolve.plugin import Physics, PointOperators
 from nlsolve.solving.simulate import run_case as march
 from nlsolve.solving.stopping import Budget
 from nlsolve.testing import check_problem
@@ -147,7 +147,7 @@ def test_the_exact_channel_profile_leaves_a_residual_that_shrinks() -> None:
         scene, law = Channel(spacing=spacing, jitter=0.1), PowerLaw(index=0.5, regularization=0.0)
         cloud = scene.cloud(PowerLaw())
         exact = scene.exact(law, cloud.nodes, 0.0)
-        force = scene.body_force(cloud.nodes[cloud.interior], law)
+        force = scene.body_force(cloud.nodes[cloud.interior], law, Physics())
         assert exact is not None
         assert force is not None
         problem = Flow(

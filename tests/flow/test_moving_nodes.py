@@ -16,13 +16,14 @@ from scipy.integrate import solve_ivp
 
 from nlsolve import SolveError, Status
 from nlsolve.flow.moving_nodes import LARGEST_SHIFT, Markers, MovingNodes, halfway, runge_kutta, shifts
-from nlsolve.plugin import Cloud
+from nlsolve.plugin import Cloud, NodeMotion, Recording, TimeSteps
 from nlsolve.show.figures import draw
 from nlsolve.show.figures.nodes.cloud import CloudFigure
 from nlsolve.solving.simulate import run_case as march
 from nlsolve.solving.stopping import StoppingTest
 
 OMEGA, TURN = 100.0, 0.02 * np.pi
+DT = TURN / 628
 MLS = MovingLeastSquares()
 
 
@@ -42,9 +43,13 @@ def rigid(places: np.ndarray) -> np.ndarray:
     return OMEGA * np.stack([-places[:, 1], places[:, 0]], axis=1)
 
 
-def carousel(**fields: Any) -> tuple[Carousel, Cloud]:
-    scene = Carousel(nodes=Rings(spacing=0.75), horizon=TURN, increment=TURN / 628, **fields)
+def carousel() -> tuple[Carousel, Cloud]:
+    scene = Carousel(nodes=Rings(spacing=0.75))
     return scene, scene.cloud(setup(scene).law)
+
+
+def shifted(shifting: float) -> NodeMotion:
+    return NodeMotion(nodes="lagrangian", shifting=shifting)
 
 
 def jittered(cloud: Cloud, part: float) -> Cloud:
@@ -88,7 +93,7 @@ def test_a_rigid_turn_returns_every_marker_to_its_place() -> None:
     _, cloud = carousel()
     places = cloud.nodes
     for _ in range(628):
-        places = runge_kutta(places, [], [], [], TURN / 628, lambda _, x: rigid(x))
+        places = runge_kutta(places, [], [], [], DT, lambda _, x: rigid(x))
     radius = np.linalg.norm(cloud.nodes, axis=1)
     assert (np.linalg.norm(places - cloud.nodes, axis=1) / radius).max() < 1e-8
 
@@ -96,21 +101,21 @@ def test_a_rigid_turn_returns_every_marker_to_its_place() -> None:
 def test_interpolation_in_space_keeps_a_rigid_turn_rigid() -> None:
     scene, cloud = carousel()
     velocity = rigid(cloud.nodes)
-    markers = Markers(scene, MLS, cloud, velocity)
+    markers = Markers(scene, DT, MLS, cloud, velocity)
     for k in range(1, 41):
-        markers.advance(cloud, velocity, k * scene.increment)
-    exact = turned(cloud.nodes, OMEGA * 40 * scene.increment)
+        markers.advance(cloud, velocity, k * DT)
+    exact = turned(cloud.nodes, OMEGA * 40 * DT)
     assert (np.linalg.norm(markers.places - exact, axis=1) / np.linalg.norm(exact, axis=1)).max() < 1e-10
 
 
 def test_markers_at_shifted_nodes_turn_too() -> None:
     """Whatever is done to the nodes: known at other places each increment, a rigid turn carries markers rigidly."""
-    scene, cloud = carousel(motion_of_nodes="lagrangian", shifting=0.1)
-    markers = Markers(scene, MLS, cloud, rigid(cloud.nodes))
+    scene, cloud = carousel()
+    markers = Markers(scene, DT, MLS, cloud, rigid(cloud.nodes))
     for k in range(1, 41):
         other = jittered(cloud, 0.05 * (k % 3))
-        markers.advance(other, rigid(other.nodes), k * scene.increment)
-    exact = turned(cloud.nodes, OMEGA * 40 * scene.increment)
+        markers.advance(other, rigid(other.nodes), k * DT)
+    exact = turned(cloud.nodes, OMEGA * 40 * DT)
     assert (np.linalg.norm(markers.places - exact, axis=1) / np.linalg.norm(exact, axis=1)).max() < 1e-10
 
 
@@ -119,8 +124,8 @@ def test_markers_at_shifted_nodes_turn_too() -> None:
 
 @pytest.fixture(scope="module")
 def marked() -> pd.DataFrame:
-    scene = StirringTool(nodes=Rings(spacing=0.5), horizon=0.03, increment=1e-3, markers=True)
-    return march(setup(scene, 1.0)).fields
+    time, motion = TimeSteps(horizon=0.03, increment=1e-3), NodeMotion(markers=True)
+    return march(setup(StirringTool(nodes=Rings(spacing=0.5)), 1.0, time=time, motion=motion)).fields
 
 
 def angles(x: pd.Series, y: pd.Series) -> np.ndarray:
@@ -161,8 +166,8 @@ def test_fields_without_markers_say_so() -> None:
 
 def test_a_marker_that_leaves_the_cloud_is_lost() -> None:
     """u = 150 (1 − y²) mm/s for 0.02 s: 3 mm in the middle of a channel 2 mm long."""
-    scene = Channel(spacing=0.25, horizon=0.02, increment=1e-3, markers=True)
-    fields = march(setup(scene, 1.0)).fields
+    time, motion = TimeSteps(horizon=0.02, increment=1e-3), NodeMotion(markers=True)
+    fields = march(setup(Channel(spacing=0.25), 1.0, time=time, motion=motion)).fields
     inner = fields[fields["boundary"] == ""]
     arrived = inner["x0"] + 0.02 * 150.0 * (1.0 - inner["y0"] ** 2)
     inside, outside = inner[arrived < 2.0], inner[arrived > 2.0 + 0.1]
@@ -188,13 +193,13 @@ def test_the_cloud_figure_draws_markers_in_place_of_nodes(marked: pd.DataFrame) 
 @pytest.mark.parametrize(
     ("fields", "sentence"),
     [
-        ({"markers": True, "motion_of_nodes": "lagrangian"}, "nodes that move are the markers themselves"),
+        ({"markers": True, "nodes": "lagrangian"}, "nodes that move are the markers themselves"),
         ({"shifting": 0.1}, "shifting = 0.1: fixed nodes are not shifted"),
     ],
 )
 def test_motions_that_do_not_fit_together(fields: dict[str, Any], sentence: str) -> None:
     with pytest.raises(ValidationError, match=sentence):
-        StirringTool(**fields)
+        NodeMotion(**fields)
 
 
 def test_shifts_even_a_cloud_out() -> None:
@@ -219,42 +224,42 @@ def test_two_near_nodes_push_each_other_apart_equally() -> None:
 
 def test_velocities_come_along_to_shifted_nodes() -> None:
     """The matrix that carries them is exact for a rigid turn, and nearly nothing where hardly anything is shifted."""
-    scene, even = carousel(motion_of_nodes="lagrangian", shifting=0.3)
+    scene, even = carousel()
     cloud = jittered(even, 0.4)
     rest = np.zeros_like(cloud.nodes)
-    moved, carry = MovingNodes(scene, MLS, even).move(cloud, rest, None, 0.0)
+    moved, carry = MovingNodes(scene, shifted(0.3), DT, MLS, even).move(cloud, rest, None, 0.0)
     assert np.abs(moved.nodes - cloud.nodes).max() > 0.02
     np.testing.assert_allclose(rigid(cloud.nodes) + carry @ rigid(cloud.nodes), rigid(moved.nodes), atol=1e-9)
-    _, carry = MovingNodes(scene.with_(shifting=1e-9), MLS, even).move(cloud, rest, None, 0.0)
+    _, carry = MovingNodes(scene, shifted(1e-9), DT, MLS, even).move(cloud, rest, None, 0.0)
     noise = np.random.default_rng(0).standard_normal(len(cloud.nodes))
     smoothed = MLS.values(cloud.nodes, cloud.nodes) @ noise - noise
     assert np.abs(carry @ noise).max() < 0.01 < 0.1 < np.abs(smoothed).max()  # supports that tie may change
 
 
 def test_quality_is_the_worst_so_far_and_a_cloud_that_collapses_is_bad() -> None:
-    scene, cloud = carousel(motion_of_nodes="lagrangian")
-    moving = MovingNodes(scene, MLS, cloud)
+    scene, cloud = carousel()
+    moving = MovingNodes(scene, NodeMotion(nodes="lagrangian"), DT, MLS, cloud)
     a = int(cloud.interior[50])
     gap = cloud.nodes - cloud.nodes[a]
     gap[a] = np.inf
     b = int(np.linalg.norm(gap, axis=1).argmin())
     velocity = np.zeros_like(cloud.nodes)
-    velocity[a] = 0.5 * gap[b] / scene.increment
+    velocity[a] = 0.5 * gap[b] / DT
     moved, carry = moving.move(cloud, velocity, None, 0.0)
     assert carry is None
     assert moving.quality == pytest.approx(0.5)
     back, _ = moving.move(moved, -velocity, None, 0.0)
     assert moving.quality == pytest.approx(0.5)
     with pytest.raises(
-        SolveError, match=r"is 0\.04 times as far from its neighbour as at t = 0: raise shifting"
+        SolveError, match=r"is 0\.04 times as far from its neighbour as at t = 0: raise motion\.shifting"
     ) as bad:
         moving.move(back, 1.92 * velocity, None, 0.0)
     assert bad.value.status is Status.BAD_CLOUD
 
 
 def test_a_march_with_shifting_keeps_the_field_and_tells_the_quality() -> None:
-    scene = StirringTool(nodes=Rings(spacing=0.5), horizon=2e-3, motion_of_nodes="lagrangian", shifting=0.2)
-    record = march(setup(scene, 0.5))
+    scene = StirringTool(nodes=Rings(spacing=0.5))
+    record = march(setup(scene, 0.5, time=TimeSteps(horizon=2e-3), motion=shifted(0.2)))
     assert record.summary["status"] == "converged"
     assert record.summary["velocity_error_inside"] < 0.05
     assert 0.5 < record.summary["cloud_quality"] < 1.0
@@ -267,10 +272,8 @@ def test_a_march_with_shifting_keeps_the_field_and_tells_the_quality() -> None:
 
 def test_after_a_failed_increment_the_last_solved_state_is_measured_on_its_own_nodes() -> None:
     """The velocities brought along to shifted nodes only start the next solve."""
-    scene = StirringTool(
-        nodes=Rings(spacing=0.5), horizon=4e-3, increment=2e-3, motion_of_nodes="lagrangian", shifting=1.0
-    )
-    record = march(setup(scene, 1.0, stop=StoppingTest(tolerance=1e-30), record=(0.0,)))
+    steps = {"time": TimeSteps(horizon=4e-3, increment=2e-3), "motion": shifted(1.0), "record": Recording(times=(0.0,))}
+    record = march(setup(StirringTool(nodes=Rings(spacing=0.5)), 1.0, stop=StoppingTest(tolerance=1e-30), **steps))
     assert record.summary["increments"] == 0
     assert record.summary["status"] != "converged"
     found, exact = (record.fields[names].to_numpy() for names in (["u", "v"], ["exact_u", "exact_v"]))

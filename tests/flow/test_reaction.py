@@ -17,7 +17,7 @@ from nlsolve_solvers import Newton
 from nlsolve.contracts.continuum.law import CONTRACTION
 from nlsolve.flow.momentum import Flow
 from nlsolve.flow.observables import wall_reaction
-from nlsolve.plugin import Discretizer, Scene
+from nlsolve.plugin import Discretizer, FlowScene, NodeMotion, Physics
 from nlsolve.series import Array
 from nlsolve.solving.simulate import run_case as march
 from nlsolve.solving.stopping import StoppingTest
@@ -28,6 +28,7 @@ CONSERVATIVE = {
     "mls nodes": MovingLeastSquares(form="conservative", points="nodes"),
 }
 OMEGA = 100.0
+FIXED = NodeMotion()
 
 
 class Encircled(StirringTool):
@@ -36,7 +37,7 @@ class Encircled(StirringTool):
     kind: Literal["encircled"] = "encircled"  # type: ignore[assignment]
     contour_radius: float = 3.0
 
-    def contour(self) -> Array:
+    def contour(self, motion: NodeMotion) -> Array:
         angle = 2.0 * np.pi * np.arange(720) / 720
         return self.contour_radius * np.stack([np.cos(angle), np.sin(angle)], axis=1)
 
@@ -66,8 +67,8 @@ def spin(discretizer: Discretizer, index: float, penalty: float = 0.0, nodes: An
     return flow, outcome.state
 
 
-def reaction(flow: Flow, u: Array, discretizer: Discretizer, scene: Scene | None = None) -> dict[str, float]:
-    return wall_reaction(scene or StirringTool(), discretizer, flow, flow.velocity(u), 0.0)
+def reaction(flow: Flow, u: Array, discretizer: Discretizer, scene: FlowScene | None = None) -> dict[str, float]:
+    return wall_reaction(scene or StirringTool(), FIXED, discretizer, flow, flow.velocity(u), 0.0)
 
 
 def dissipation(flow: Flow, u: Array) -> float:
@@ -142,8 +143,9 @@ class TestTorqueOfTheSpin:
         assert self.error(CONSERVATIVE[name], 1.0, 0.25) < 0.021
 
 
-def solved(scene: Scene, discretizer: Discretizer, index: float = 1.0, tolerance: float = 1e-10) -> dict[str, Any]:
-    row = march(setup(scene, index, discretizer=discretizer, stop=StoppingTest(tolerance=tolerance))).summary
+def solved(scene: FlowScene, discretizer: Discretizer, physics: Physics) -> dict[str, Any]:
+    stop = StoppingTest(tolerance=1e-10)
+    row = march(setup(scene, 1.0, discretizer=discretizer, physics=physics, stop=stop)).summary
     assert row["status"] == "converged", row["message"]
     return row
 
@@ -164,7 +166,7 @@ def test_the_exact_field_of_the_spin_gives_the_exact_torque_through_any_contour(
     pressed = Flow(cloud, operators, law, exact.velocity[cloud.boundary], 1e-12, constant)
     for radius in (1.8, 3.0, 5.0):
         found = [
-            wall_reaction(Encircled(contour_radius=radius), discretizer, flow, exact.velocity, 0.0)
+            wall_reaction(Encircled(contour_radius=radius), FIXED, discretizer, flow, exact.velocity, 0.0)
             for flow in (plain, pressed)
         ]
         assert found[0]["torque"] == pytest.approx(exact.quantities["torque"], rel=2e-3)
@@ -186,16 +188,16 @@ def test_a_strong_form_does_not_use_virtual_power() -> None:
 # Where there is a pressure.
 
 
-PENALTY, ITERATED = {"penalty": 1e4}, {"penalty": 1e3, "divergence": 1e-7}
+PENALTY, ITERATED = Physics(penalty=1e4), Physics(penalty=1e3, divergence_tolerance=1e-7)
 
 
-@pytest.mark.parametrize(("name", "volume"), [("delaunay", PENALTY), ("delaunay", ITERATED), ("mls", PENALTY)])
-def test_the_force_of_the_orbit_by_virtual_power_is_that_through_the_contour(name: str, volume: dict[str, Any]) -> None:
+@pytest.mark.parametrize(("name", "physics"), [("delaunay", PENALTY), ("delaunay", ITERATED), ("mls", PENALTY)])
+def test_the_force_of_the_orbit_by_virtual_power_is_that_through_the_contour(name: str, physics: Physics) -> None:
     """The same scene by a conservative form and by a strong one."""
-    scene = StirringTool.model_validate({"motion": "orbit", "nodes": Rings(spacing=0.25), **volume})
+    scene = StirringTool(motion="orbit", nodes=Rings(spacing=0.25))
     by_power, through = (
         np.array([row["force_x"], row["force_y"]])
-        for row in (solved(scene, form) for form in (CONSERVATIVE[name], MovingLeastSquares()))
+        for row in (solved(scene, form, physics) for form in (CONSERVATIVE[name], MovingLeastSquares()))
     )
     assert np.linalg.norm(by_power - through) < 0.02 * np.linalg.norm(through)
 
@@ -206,7 +208,7 @@ def test_both_ways_on_one_and_the_same_flow() -> None:
     scene = StirringTool(motion="orbit", nodes=Rings(spacing=0.25))
     cloud = scene.cloud(law)
     operators = discretizer.operators(cloud, True)
-    modulus = scene.with_(penalty=1e4).penalty_modulus(law, np.ones(1))
+    modulus = PENALTY.penalty_modulus(law, scene.reference_rate, np.ones(1))
     flow = Flow(cloud, operators, law, scene.boundary_velocity(cloud, law, 0.0), modulus)
     u = run(flow, Newton(), None, np.zeros(2 * len(cloud.interior)))[0].state
     without = replace(operators, strain=replace(operators.strain, areas=None))
@@ -217,7 +219,7 @@ def test_both_ways_on_one_and_the_same_flow() -> None:
 
 
 @pytest.mark.parametrize(
-    ("discretizer", "volume"),
+    ("discretizer", "physics"),
     [
         (LinearTriangles(), PENALTY),
         (LinearTriangles(), ITERATED),
@@ -226,9 +228,9 @@ def test_both_ways_on_one_and_the_same_flow() -> None:
         (CONSERVATIVE["mls"], PENALTY),
     ],
 )
-def test_torque_and_force_of_the_bearing(discretizer: Discretizer, volume: dict[str, Any]) -> None:
+def test_torque_and_force_of_the_bearing(discretizer: Discretizer, physics: Physics) -> None:
     """2560 nodes, Jeffery's closed form: within one percent."""
-    row = solved(EccentricCylinders.model_validate({"spacing": 0.1, **volume}), discretizer)
+    row = solved(EccentricCylinders(spacing=0.1), discretizer, physics)
     assert row["nodes"] == 2560
     assert row["torque_error"] <= 0.01
     assert row["force_error"] <= 0.01

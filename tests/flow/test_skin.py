@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import pytest
@@ -20,7 +19,7 @@ from nlsolve_solvers.modified_newton import ModifiedNewton
 from pydantic import ValidationError
 
 from nlsolve.flow.moving_nodes import MovingNodes, Neighbourhoods
-from nlsolve.plugin import Cloud, Discretizer, Operators
+from nlsolve.plugin import Cloud, Discretizer, NodeMotion, Operators, Physics, TimeSteps
 from nlsolve.solving.simulate import run_case as march
 from nlsolve.solving.stopping import StoppingTest
 from nlsolve.testing import check_discretizer
@@ -39,12 +38,15 @@ EACH_FORM = pytest.mark.parametrize("discretizer", FORMS.values(), ids=FORMS)
 GRID = CLOUDS["grid"]
 
 
-def lagrangian(skin: float, **fields: Any) -> StirringTool:
-    return StirringTool(nodes=Rings(spacing=0.75), motion_of_nodes="lagrangian", skin=skin, **fields)
+SCENE = StirringTool(nodes=Rings(spacing=0.75))
+
+
+def lagrangian(skin: float, shifting: float = 0.0) -> NodeMotion:
+    return NodeMotion(nodes="lagrangian", skin=skin, shifting=shifting)
 
 
 def moving(skin: float, discretizer: Discretizer, cloud: Cloud) -> MovingNodes:
-    return MovingNodes(lagrangian(skin), discretizer, cloud)
+    return MovingNodes(SCENE, lagrangian(skin), TimeSteps().increment, discretizer, cloud)
 
 
 def sheared(cloud: Cloud, shear: float, noise: float = 0.0) -> Cloud:
@@ -87,7 +89,7 @@ def test_a_rigid_motion_parts_nobody_and_a_shear_those_on_the_diagonal() -> None
 
 def test_fixed_nodes_have_no_skin() -> None:
     with pytest.raises(ValidationError, match=r"skin = 0\.3: the neighbours of fixed nodes never change"):
-        StirringTool(skin=0.3)
+        NodeMotion(skin=0.3)
 
 
 # Kept neighbours.
@@ -226,11 +228,17 @@ SEARCHES: list[int] = []
 def test_a_spin_with_a_skin_ends_in_the_field_of_one_without(volume_points: str, shifting: float) -> None:
     """The tool turns by 0.6 rad in 15 increments, its first neighbours by far less."""
     errors, searches = [], []
-    parts = {"discretizer": Counted(volume_points=volume_points), "stop": StoppingTest()}
+    parts = {
+        "physics": Physics(penalty=10.0),
+        "time": TimeSteps(horizon=6e-3, increment=4e-4),
+        "discretizer": Counted(volume_points=volume_points),
+        "solver": ModifiedNewton(),
+        "refresh": PoorContraction(),
+        "stop": StoppingTest(),
+    }
     for skin in (0.0, 0.3):
         SEARCHES.clear()
-        scene = lagrangian(skin, horizon=6e-3, increment=4e-4, penalty=10.0, shifting=shifting)
-        record = march(setup(scene, 0.5, solver=ModifiedNewton(), refresh=PoorContraction(), **parts))
+        record = march(setup(SCENE, 0.5, motion=lagrangian(skin, shifting), **parts))
         assert record.summary["status"] == "converged"
         errors.append(record.summary["velocity_error"])
         searches.append(len(SEARCHES))

@@ -17,7 +17,7 @@ from nlsolve import SolveError, Status
 from nlsolve.cli.printing import left_out
 from nlsolve.flow.momentum import Flow
 from nlsolve.flow.validity import HEAT_CAPACITY, LIMITS, audit
-from nlsolve.plugin import Cloud, ConstitutiveLaw
+from nlsolve.plugin import Cloud, ConstitutiveLaw, Discretizer, FlowScene, NodeMotion, Physics, TimeSteps
 from nlsolve.results.columns import RUNS
 from nlsolve.solving.simulate import run_case as march
 from nlsolve.solving.stopping import StoppingTest
@@ -31,17 +31,20 @@ def spin(**fields: Any) -> StirringTool:
     return StirringTool(**({"nodes": COARSE} | fields))
 
 
-def summary(scene: StirringTool | Channel, index: float = 1.0, **parts: Any) -> dict[str, Any]:
+LAGRANGIAN = NodeMotion(nodes="lagrangian")
+
+
+def summary(scene: FlowScene, index: float = 1.0, **parts: Any) -> dict[str, Any]:
     return march(setup(scene, index, **parts)).summary
 
 
-def audit_of(velocity: Any, law: ConstitutiveLaw = NEWTONIAN, change: Any = None, **fields: Any) -> dict[str, Any]:
+def audit_of(velocity: Any, law: ConstitutiveLaw = NEWTONIAN, change: Any = None, **parts: Any) -> dict[str, Any]:
     """The audit of a velocity given as a function of the places."""
-    scene = spin(**fields)
-    cloud = scene.cloud(law)
+    case = setup(spin(), law=law, **parts)
+    cloud = case.scene.cloud(law)
     given = velocity(cloud.nodes)
-    flow = Flow(cloud, MovingLeastSquares().operators(cloud, False), law, given[cloud.boundary])
-    return audit(scene, MovingLeastSquares(), flow, given, change, 0.0)
+    flow = Flow(cloud, case.discretizer.operators(cloud, False), law, given[cloud.boundary])
+    return audit(case, flow, given, change, 0.0)
 
 
 def linear(*rows: tuple[float, float]) -> Any:
@@ -69,7 +72,7 @@ def expected_ratio(density: float) -> float:
 
 @pytest.mark.parametrize("density", [2.81e-9, 1.0])
 def test_convection_of_the_spin(density: float) -> None:
-    row = summary(spin(density=density))
+    row = summary(spin(), physics=Physics(density=density))
     assert row["audit.convection"] == pytest.approx(expected_ratio(density), rel=0.1)
     assert ("convection = true" in row["doubt"]) == (density == 1.0)
     assert np.isnan(row["audit.inertia"])
@@ -77,18 +80,20 @@ def test_convection_of_the_spin(density: float) -> None:
 
 @pytest.mark.parametrize("density", [2.81e-9, 1.0])
 def test_inertia_on_moving_nodes_is_the_acceleration_of_the_material(density: float) -> None:
-    row = summary(spin(density=density, horizon=3e-4, motion_of_nodes="lagrangian"))
+    row = summary(spin(), physics=Physics(density=density), time=TimeSteps(horizon=3e-4), motion=LAGRANGIAN)
     assert row["audit.inertia"] == pytest.approx(expected_ratio(density), rel=0.1)
     assert ("inertia = true" in row["doubt"]) == (density == 1.0)
     assert np.isnan(row["audit.convection"])
 
 
 def test_inertia_on_fixed_nodes_of_a_steady_flow_is_none() -> None:
-    assert summary(spin(density=1.0, horizon=2e-4))["audit.inertia"] == pytest.approx(0.0, abs=1e-6)
+    row = summary(spin(), physics=Physics(density=1.0), time=TimeSteps(horizon=2e-4))
+    assert row["audit.inertia"] == pytest.approx(0.0, abs=1e-6)
 
 
 def test_a_term_that_is_kept_is_not_audited() -> None:
-    row = summary(spin(density=1.0, horizon=2e-4, inertia=True, convection=True))
+    physics = Physics(density=1.0, inertia=True, convection=True)
+    row = summary(spin(), physics=physics, time=TimeSteps(horizon=2e-4))
     assert np.isnan(row["audit.inertia"])
     assert np.isnan(row["audit.convection"])
     assert "inertia" not in row["doubt"]
@@ -108,7 +113,7 @@ def test_an_expansion_is_compressible_and_a_shear_is_not() -> None:
 @pytest.mark.parametrize(("penalty", "doubtful"), [(1.0, True), (100.0, True), (1000.0, False)])
 def test_a_small_penalty_is_doubted(penalty: float, doubtful: bool) -> None:
     """The orbit squeezes the material: its velocity is wrong by about 18/penalty."""
-    row = summary(spin(motion="orbit", penalty=penalty), 0.5, discretizer=NODES)
+    row = summary(spin(motion="orbit"), 0.5, physics=Physics(penalty=penalty), discretizer=NODES)
     assert row["audit.compressibility"] == row["divergence"]
     assert ("raise the penalty" in row["doubt"]) == doubtful
 
@@ -170,7 +175,7 @@ def test_quadratic_velocities_are_resolved_and_alternating_ones_are_not() -> Non
 
 def test_heating_of_a_shear_and_that_it_is_no_doubt() -> None:
     """V = (g y, 0): S:ε̇ = μ g², for a turn of the tool."""
-    found = audit_of(linear((0, 200), (0, 0)), density=2.81e-9)
+    found = audit_of(linear((0, 200), (0, 0)), physics=Physics(density=2.81e-9))
     viscosity = float(NEWTONIAN.viscosity(np.ones(1))[0])
     expected = viscosity * 200.0**2 / (2.81e-9 * HEAT_CAPACITY) * 2.0 * np.pi / 100.0
     assert found["audit.heating"] == pytest.approx(expected)
@@ -179,7 +184,7 @@ def test_heating_of_a_shear_and_that_it_is_no_doubt() -> None:
 
 
 def test_heating_of_a_march_is_over_its_time() -> None:
-    steady, marched = summary(spin()), summary(spin(horizon=2e-4))
+    steady, marched = summary(spin()), summary(spin(), time=TimeSteps(horizon=2e-4))
     assert marched["audit.heating"] == pytest.approx(steady["audit.heating"] * 2e-4 / (0.02 * np.pi), rel=1e-6)
 
 
@@ -219,7 +224,8 @@ def test_a_residual_small_only_beside_a_huge_penalty_is_in_doubt() -> None:
     """λ/μ = 1e8 makes 1e-8 of all forces 1e-3 of the stresses: the test is met before these are in balance."""
     graded = GradedRings(first=0.08, growth=0.15, spacing=0.4)
     loose, tight = (
-        summary(spin(nodes=graded, penalty=penalty), 0.3, stop=StoppingTest(tolerance=1e-8)) for penalty in (1e8, 1e2)
+        summary(spin(nodes=graded), 0.3, physics=Physics(penalty=penalty), stop=StoppingTest(tolerance=1e-8))
+        for penalty in (1e8, 1e2)
     )
     assert loose["status"] == tight["status"] == "converged"
     assert loose["velocity_error_inside"] > 2.0 * tight["velocity_error_inside"]
@@ -246,28 +252,32 @@ def test_a_smooth_field_that_is_wrong_on_a_ragged_cloud_is_out_of_balance() -> N
 
 TRIANGLES = LinearTriangles()
 GRADED = GradedRings(first=0.08, growth=0.15, spacing=0.4)
+PENALTY, ITERATED = Physics(penalty=1e4), Physics(penalty=1e2, divergence_tolerance=1e-6)
+MARCHED = {"physics": Physics(inertia=True), "time": TimeSteps(horizon=2e-4), "motion": LAGRANGIAN}
 
 
 @pytest.mark.parametrize(
-    ("scene", "index", "discretizer"),
+    ("scene", "index", "discretizer", "sections"),
     [
-        (spin(nodes=GRADED), 0.3, MovingLeastSquares()),
-        (spin(nodes=GRADED), 0.1324, MovingLeastSquares(support=15, force_support=18)),  # wrong, and smooth
-        (spin(nodes=GRADED), 0.1324, MovingLeastSquares(degree=1)),
-        (spin(nodes=GRADED), 0.1324, RadialBasis()),
-        (spin(), 1.0, MovingLeastSquares(points="nodes")),
-        (spin(nodes=GRADED, penalty=1e4), 0.3, MovingLeastSquares()),
-        (spin(nodes=GRADED, penalty=1e2, divergence=1e-6), 0.3, MovingLeastSquares(form="conservative")),
-        (spin(nodes=GRADED, horizon=2e-4, inertia=True, motion_of_nodes="lagrangian"), 0.3, MovingLeastSquares()),
-        (EccentricCylinders(penalty=1e4), 1.0, MovingLeastSquares(points="nodes")),
+        (spin(nodes=GRADED), 0.3, MovingLeastSquares(), {}),
+        (spin(nodes=GRADED), 0.1324, MovingLeastSquares(support=15, force_support=18), {}),  # wrong, and smooth
+        (spin(nodes=GRADED), 0.1324, MovingLeastSquares(degree=1), {}),
+        (spin(nodes=GRADED), 0.1324, RadialBasis(), {}),
+        (spin(), 1.0, MovingLeastSquares(points="nodes"), {}),
+        (spin(nodes=GRADED), 0.3, MovingLeastSquares(), {"physics": PENALTY}),
+        (spin(nodes=GRADED), 0.3, MovingLeastSquares(form="conservative"), {"physics": ITERATED}),
+        (spin(nodes=GRADED), 0.3, MovingLeastSquares(), MARCHED),
+        (EccentricCylinders(), 1.0, MovingLeastSquares(points="nodes"), {"physics": PENALTY}),
     ],
 )
-def test_the_estimate_misses_the_error_by_that_of_the_estimator(scene: Any, index: float, discretizer: Any) -> None:
+def test_the_estimate_misses_the_error_by_that_of_the_estimator(
+    scene: FlowScene, index: float, discretizer: Discretizer, sections: dict[str, Any]
+) -> None:
     """|‖v − v′‖ − ‖v − v_exact‖| ≤ ‖v′ − v_exact‖, and more as one is over ‖v‖, the other over ‖v_exact‖. A tenth more
     because v′ is one Newton step from v.
     """
-    row = summary(scene, index, discretizer=discretizer, error_estimator=TRIANGLES)
-    others = summary(scene, index, discretizer=TRIANGLES)["velocity_error_inside"]
+    row = summary(scene, index, discretizer=discretizer, error_estimator=TRIANGLES, **sections)
+    others = summary(scene, index, discretizer=TRIANGLES, **sections)["velocity_error_inside"]
     error, estimate = row["velocity_error_inside"], row["velocity_error_estimate"]
     assert others < error / 2.0
     assert abs(estimate - error) < 1.1 * (others + error * estimate)

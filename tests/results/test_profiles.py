@@ -300,7 +300,7 @@ def test_names_of_settings_settle_what_they_assign() -> None:
             "trial": ["x", "y", "x", "y"],
             "solver.kind": ["newton", "newton", "anm", "anm"],
             "law.index": [1.0, 0.5, 1.0, 0.5],
-            "record": ["[]", "[]", "[]", "[1.0]"],
+            "record.times": ["[]", "[]", "[]", "[1.0]"],
         }
     )
     assert differing_parameters(frame) == ["strategy", "trial"]

@@ -42,12 +42,12 @@ def test_every_scene_gets_one_reference_and_every_case_names_its_own() -> None:
     references = [case for case in study.cases if not case.reference]
     assert len(study.cases) == 6
     assert [case.parameters["variant"] for case in references] == ["reference", "reference"]
-    assert [case.setup.stop.tolerance for case in references] == [1e-12, 1e-12]
+    assert [case.parts.stop.tolerance for case in references] == [1e-12, 1e-12]
     by_id = {case.id: case for case in study.cases}
     for case in study.cases[2:]:
-        assert by_id[case.reference].setup.law == case.setup.law
-        assert by_id[case.reference].setup.solver.kind_name() == "newton"
-        assert by_id[case.reference].setup.refresh.kind_name() == "every-iteration"
+        assert by_id[case.reference].parts.law == case.parts.law
+        assert by_id[case.reference].parts.solver.kind_name() == "newton"
+        assert by_id[case.reference].parts.refresh.kind_name() == "every-iteration"
 
 
 def test_the_error_is_the_distance_of_the_recorded_velocities() -> None:
@@ -76,9 +76,9 @@ def test_a_case_that_is_the_reference_is_not_run_twice() -> None:
 
 def test_what_is_set_by_hand_holds_for_the_reference_too_but_for_what_the_reference_settles() -> None:
     study = Study.from_dict(STUDY, {"scene.angular_speed": 50.0, "stop.tolerance": 1e-3})
-    assert {case.setup.scene.model_dump()["angular_speed"] for case in study.cases} == {50.0}
-    assert {case.setup.stop.tolerance for case in study.cases if not case.reference} == {1e-12}
-    assert {case.setup.stop.tolerance for case in study.cases if case.reference} == {1e-3}
+    assert {case.parts.scene.model_dump()["angular_speed"] for case in study.cases} == {50.0}
+    assert {case.parts.stop.tolerance for case in study.cases if not case.reference} == {1e-12}
+    assert {case.parts.stop.tolerance for case in study.cases if case.reference} == {1e-3}
 
 
 def test_a_wrong_reference_is_told() -> None:

@@ -27,27 +27,27 @@ def study(tmp_path) -> Study:
 
 @pytest.fixture(autouse=True)
 def marched(monkeypatch) -> list:
-    """The setups that were marched; the march itself is replaced."""
-    setups: list = []
+    """The parts of the cases that were run; the run itself is replaced."""
+    cases: list = []
 
-    def march(setup, listen, clock):
-        setups.append(setup)
-        return fake_march(setup, listen)
+    def march(parts, listen, clock):
+        cases.append(parts)
+        return fake_march(parts, listen)
 
     monkeypatch.setattr("nlsolve.running.runner.run_case", march)
-    return setups
+    return cases
 
 
 def failing_on(monkeypatch, number: int, error: BaseException) -> None:
     """The march of one case, by number from 1, raises."""
     count = 0
 
-    def march(setup, listen, clock):
+    def march(parts, listen, clock):
         nonlocal count
         count += 1
         if count == number:
             raise error
-        return fake_march(setup, listen)
+        return fake_march(parts, listen)
 
     monkeypatch.setattr("nlsolve.running.runner.run_case", march)
 
@@ -98,7 +98,7 @@ def test_a_damaged_part_is_run_again(study, tmp_path, marched):
     run(study, tmp_path / "out")
     (tmp_path / "out" / "cases" / f"{study.cases[2].id}.steps.parquet").write_bytes(b"PAR1")
     results = run(study, tmp_path / "out")
-    assert [setup.solver.order for setup in marched[4:]] == [20]
+    assert [parts.solver.order for parts in marched[4:]] == [20]
     assert results.runs["case"].tolist() == [case.id for case in study.cases]
 
 
@@ -158,9 +158,9 @@ def test_events(study, tmp_path):
 def test_a_case_has_one_thread(study, monkeypatch):
     seen = []
 
-    def march(setup, listen, clock):
+    def march(parts, listen, clock):
         seen.extend(pool["num_threads"] for pool in threadpool_info())
-        return fake_march(setup, listen)
+        return fake_march(parts, listen)
 
     monkeypatch.setattr("nlsolve.running.runner.run_case", march)
     run(study)

@@ -72,7 +72,7 @@ def frames() -> dict[str, pd.DataFrame]:
     runs["status"] = ["converged"] * 3 + ["diverged"]
     runs["tangents"] = [208, 88, 94, 2252]
     runs["velocity_error"] = np.nan
-    runs["scene.increment"] = 0.01
+    runs["time.increment"] = 0.01
     time = np.repeat(np.arange(1, 61) * 0.01, 2)
     steps = [
         pd.DataFrame(
@@ -241,7 +241,7 @@ def test_time_is_the_nearest_and_said_when_off(frames: dict[str, pd.DataFrame]) 
     assert near.axes[0].get_title() == ""
     far = picture(frames, kind="field", value="u", where=ONE, time=0.4)
     assert far.axes[0].get_title() == "$t$ = 0.3 s, nearest to 0.4 s"
-    bare = frames | {"runs": frames["runs"].drop(columns="scene.increment")}
+    bare = frames | {"runs": frames["runs"].drop(columns="time.increment")}
     assert picture(bare, kind="cloud", where=ONE, time=0.304).axes[0].get_title() == "$t$ = 0.3 s, nearest to 0.304 s"
 
 
@@ -450,11 +450,11 @@ def test_wrong_declarations_are_refused_before_anything_runs(spec: dict[str, Any
 
 
 def test_values_of_where_may_be_lists_booleans_and_words(frames: dict[str, pd.DataFrame]) -> None:
-    columns: dict[str, Any] = {"scene.inertia": [True, False, True, None], "scene.probe": [[0.0, 1.6]] * 4}
+    columns: dict[str, Any] = {"physics.inertia": [True, False, True, None], "record.probe": [[0.0, 1.6]] * 4}
     runs = frames["runs"].assign(**columns)
     figure = picture(
-        frames | {"runs": runs}, kind="line", y="range", where={"scene.inertia": [True, False], "solver.kind": "anm"},
-        group=["scene.inertia", "solver.order", "scene.probe"],
+        frames | {"runs": runs}, kind="line", y="range", where={"physics.inertia": [True, False], "solver.kind": "anm"},
+        group=["physics.inertia", "solver.order", "record.probe"],
     )  # fmt: skip
     assert legend(figure) == [
         "inertia, order 10, probe (0, 1.6)",

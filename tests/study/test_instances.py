@@ -108,7 +108,7 @@ def test_a_study_runs_with_instances():
     document = {"question": QUESTION, "scene": Square(constant=9.0), "solver": Half(length=0.9), "refresh": Always()}
     results = nlsolve.run(document)
     (case,) = results.study.cases
-    assert (type(case.setup.scene), type(case.setup.solver), type(case.setup.refresh)) == (Square, Half, Always)
+    assert (type(case.parts.scene), type(case.parts.solver), type(case.parts.refresh)) == (Square, Half, Always)
     run = results.runs.iloc[0]
     assert (run["status"], run["solver.kind"], run["solver.length"]) == ("converged", "half", 0.9)
     assert run["solver.class"] == f"{__name__}.Half"
@@ -118,7 +118,7 @@ def test_a_study_runs_with_instances():
 def test_two_classes_of_one_kind_are_two_cases():
     grid = [{"grid": {"solver": [Half(), Twin(), Newton(), Newtons()]}}]
     cases = study(sweep=grid).cases
-    assert [type(case.setup.solver) for case in cases] == [Half, Twin, Newton, Newtons]
+    assert [type(case.parts.solver) for case in cases] == [Half, Twin, Newton, Newtons]
     assert len({case.id for case in cases}) == 4
     names = [case.parameters.get("solver.class") for case in cases]
     assert names == [f"{__name__}.Half", f"{__name__}.Twin", None, f"{__name__}.Newtons"]
@@ -135,11 +135,11 @@ def test_an_installed_class_has_the_id_of_its_kind():
 
 def test_a_component_inside_another_keeps_its_class():
     (case,) = study(solver=Newton(globalization=Halving())).cases
-    assert type(case.setup.solver) is Newton
-    assert type(case.setup.solver.globalization) is Halving
+    assert type(case.parts.solver) is Newton
+    assert type(case.parts.solver.globalization) is Halving
     assert case.parameters["solver.globalization.class"] == f"{__name__}.Halving"
     (swept,) = study(solver={"kind": "newton"}, sweep=[{"grid": {"solver.globalization": [Halving()]}}]).cases
-    assert type(swept.setup.solver.globalization) is Halving
+    assert type(swept.parts.solver.globalization) is Halving
     assert swept.id == case.id
     changed = Newton(globalization=Halving()).with_(kind="newton")
     assert type(changed.globalization) is Halving
@@ -155,26 +155,26 @@ def test_a_component_inside_another_keeps_its_class():
 )
 def test_instances_are_swept(sweep):
     cases = study(sweep=[sweep]).cases
-    assert [case.setup.solver for case in cases] == [Half(), Half(length=1.0)]
+    assert [case.parts.solver for case in cases] == [Half(), Half(length=1.0)]
 
 
 def test_the_fields_of_an_instance_are_swept_and_set():
     cases = study(solver=Half(), sweep=[{"grid": {"solver.length": [0.5, 1.0]}}]).cases
-    assert [case.setup.solver for case in cases] == [Half(), Half(length=1.0)]
+    assert [case.parts.solver for case in cases] == [Half(), Half(length=1.0)]
     assert [case.label for case in cases] == ["solver.length = 0.5", "solver.length = 1.0"]
     by_hand = {"question": QUESTION, "scene": SYSTEM, "solver": Half()}
     (case,) = nlsolve.Study.from_dict(by_hand, overrides={"solver.length": 0.7}).cases
-    assert case.setup.solver == Half(length=0.7)
+    assert case.parts.solver == Half(length=0.7)
     (case,) = nlsolve.Study.from_dict(by_hand, overrides={"solver": Twin()}).cases
-    assert type(case.setup.solver) is Twin
+    assert type(case.parts.solver) is Twin
     quick = by_hand | {"quick": {"solver": Twin(length=0.6)}}
     (case,) = nlsolve.Study.from_dict(quick, quick=True).cases
-    assert (type(case.setup.solver), case.setup.solver.length) == (Twin, 0.6)
+    assert (type(case.parts.solver), case.parts.solver.length) == (Twin, 0.6)
 
 
 def test_a_reference_may_be_an_instance():
     cases = study(solver={"kind": "newton"}, reference={"solver": Half()}).cases
-    assert [type(case.setup.solver) for case in cases] == [Half, Newton]
+    assert [type(case.parts.solver) for case in cases] == [Half, Newton]
     assert cases[1].reference == cases[0].id
 
 

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import tomllib
+from typing import Any
 
 import pytest
 from fakes import STUDY, Box, Homotopy, Newton, registry_of, write_study
 
 from nlsolve.registry.problems import MOVED, StudyError
 from nlsolve.registry.toml_lines import lines_of, nearest_line
-from nlsolve.study.case import SECTIONS
+from nlsolve.study.case import Composer
 from nlsolve.study.study import Frame, Study
 from nlsolve.study.sweeps import parse_assignments
 
@@ -24,6 +25,11 @@ def complaint(folder, *changes, **options) -> str:
     with pytest.raises(StudyError) as caught:
         read(folder, *changes, **options)
     return str(caught.value).replace(str(folder), "")
+
+
+def read_parts() -> Any:
+    """The components of the first case of the study."""
+    return Study.from_dict(tomllib.loads(STUDY), registry=REGISTRY).cases[0].parts
 
 
 class TestCases:
@@ -43,7 +49,7 @@ class TestCases:
         )
         study = read(tmp_path, text=text)
         assert len(study.cases) == 12
-        assert [(c.setup.law.index, c.setup.scene.side) for c in study.cases[:3]] == [
+        assert [(c.parts.law.index, c.parts.scene.side) for c in study.cases[:3]] == [
             (0.1, "left"),
             (0.2, "right"),
             (0.3, "left"),
@@ -53,24 +59,24 @@ class TestCases:
         sweep = 'grid = { solver = [{ kind = "newton" }, { kind = "anm", order = 7 }] }'
         text = STUDY[: STUDY.index("grid = ")] + sweep + "\n"
         newton, homotopy = read(tmp_path, text=text).cases
-        assert isinstance(newton.setup.solver, Newton)
+        assert isinstance(newton.parts.solver, Newton)
         assert newton.parameters["refresh.kind"] == "every-iteration"
         assert "solver.order" not in newton.parameters
-        assert homotopy.setup.solver == Homotopy(order=7)
+        assert homotopy.parts.solver == Homotopy(order=7)
         assert (homotopy.parameters["refresh.kind"], homotopy.parameters["refresh.m"]) == ("every-m", 3)
         assert homotopy.swept == ("solver.kind",)  # order and tolerance are one and the same wherever there are any
 
     def test_sections_with_a_default_may_be_left_out_or_have_no_kind(self, tmp_path):
         case = read(tmp_path, ("[solver]", "[linear]\nrefinement = 2\n[refresh]\nm = 9\n[solver]")).cases[0]
-        assert (case.setup.linear.kind_name(), case.setup.linear.refinement) == ("superlu", 2)
-        assert (case.setup.refresh.kind_name(), case.parameters["refresh.m"]) == ("every-m", 9)
-        assert case.setup.starter.kind_name() == "newton"
+        assert (case.parts.linear.kind_name(), case.parts.linear.refinement) == ("superlu", 2)
+        assert (case.parts.refresh.kind_name(), case.parameters["refresh.m"]) == ("every-m", 9)
+        assert case.parts.starter.kind_name() == "newton"
 
     def test_parameters_are_flat_and_lists_are_text(self, tmp_path):
-        parameters = read(tmp_path, ("question", "record = [0.5]\nquestion")).cases[0].parameters
+        parameters = read(tmp_path, ("question", "record = { times = [0.5] }\nquestion")).cases[0].parameters
         assert parameters["scene.nodes.kind"] == "even"
         assert parameters["scene.nodes.count"] == 4
-        assert parameters["record"] == "[0.5]"
+        assert parameters["record.times"] == "[0.5]"
         assert parameters["start.values"] == "[1.0, 0.5, 0.3, 0.2]"
 
     def test_identity_follows_from_the_components_only(self, tmp_path):
@@ -84,18 +90,18 @@ class TestCases:
 
     def test_what_is_set_by_hand_wins_over_what_is_swept(self, tmp_path):
         study = read(tmp_path, overrides={"solver.order": 15})
-        assert [case.setup.solver.order for case in study.cases] == [15, 15]
+        assert [case.parts.solver.order for case in study.cases] == [15, 15]
 
     def test_quick_changes_parameters_and_sweeps(self, tmp_path):
         study = read(tmp_path, quick=True)
-        assert [(case.setup.scene.side, case.setup.solver.order) for case in study.cases] == [("right", 10)]
+        assert [(case.parts.scene.side, case.parts.solver.order) for case in study.cases] == [("right", 10)]
         assert read(tmp_path).has_quick
 
     def test_from_a_dictionary_of_components(self):
         document = {**tomllib.loads(STUDY), "scene": Box(side="right"), "sweep": [{"grid": {"solver": [Newton()]}}]}
         document = {name: value for name, value in document.items() if name not in ("table", "quick")}
         (case,) = Study.from_dict(document, registry=REGISTRY).cases
-        assert (case.setup.scene.side, case.setup.solver) == ("right", Newton())
+        assert (case.parts.scene.side, case.parts.solver) == ("right", Newton())
 
 
 SETTINGS = """each = [
@@ -112,7 +118,7 @@ class TestSettings:
         cases = read(tmp_path, text=EACH).cases
         assert [case.parameters["variant"] for case in cases] == ["as it is", "ε₀ = 10", "newton"]
         assert [case.label for case in cases] == ["as it is", "ε₀ = 10", "newton"]
-        assert [(c.setup.law.index, c.setup.scene.side, c.setup.solver.kind_name()) for c in cases] == [
+        assert [(c.parts.law.index, c.parts.scene.side, c.parts.solver.kind_name()) for c in cases] == [
             (0.5, "left", "anm"),
             (0.7, "right", "anm"),
             (0.5, "left", "newton"),
@@ -186,7 +192,7 @@ class TestSettings:
 
     def test_the_hand_wins_and_is_named(self, tmp_path):
         cases = read(tmp_path, text=EACH, overrides={"law.index": 0.9}).cases
-        assert {case.setup.law.index for case in cases} == {0.9}
+        assert {case.parts.law.index for case in cases} == {0.9}
         assert "--set: law.index = -1" in complaint(tmp_path, text=EACH, overrides={"law.index": -1})
 
     def test_quick_may_have_settings_of_its_own(self, tmp_path):
@@ -222,7 +228,7 @@ class TestSettings:
         document = {name: value for name, value in tomllib.loads(STUDY).items() if name not in ("table", "quick")}
         sweep = [{"each": [{"name": "newton", "solver": Newton()}, {"name": "p = 7", "solver": Homotopy(order=7)}]}]
         cases = Study.from_dict(document | {"sweep": sweep}, registry=REGISTRY).cases
-        assert [case.setup.solver for case in cases] == [Newton(), Homotopy(order=7)]
+        assert [case.parts.solver for case in cases] == [Newton(), Homotopy(order=7)]
 
 
 class TestComplaints:
@@ -303,7 +309,7 @@ class TestComplaints:
         assert "a sweep has one of grid, zip and each" in complaint(tmp_path, ("[[table]]", "[[sweep]]\n[[table]]"))
 
     def test_claim_needs_a_solver_that_claims(self, tmp_path):
-        assert read(tmp_path, ("[solver]", '[stop]\nkind = "claim"\n[solver]')).cases[0].setup.stop.kind == "claim"
+        assert read(tmp_path, ("[solver]", '[stop]\nkind = "claim"\n[solver]')).cases[0].parts.stop.kind == "claim"
         text = STUDY[: STUDY.index("[[sweep]]")].replace('"anm"', '"newton"') + '[stop]\nkind = "claim"'
         message = complaint(tmp_path, text=text)
         assert "line 16: stop.kind = 'claim': the solver 'newton' never claims a solution" in message
@@ -419,9 +425,43 @@ class TestMoved:
         message = complaint(tmp_path, change, text=plain, **options)
         assert message == f"/study.toml, {where}: scene.flank: this is called place.side now"
 
+    @pytest.mark.parametrize(
+        ("old", "new"),
+        [
+            ("scene.horizon", "time.horizon"),
+            ("scene.divergence", "physics.divergence_tolerance"),
+            ("scene.motion_of_nodes", "motion.nodes"),
+            ("scene.probe", "record.probe"),
+            ("budget.pressures", "physics.pressure_iterations"),
+        ],
+    )
+    def test_a_field_that_has_a_section_of_its_own_now(self, tmp_path, old, new):
+        section, field = old.split(".")
+        budget = "[budget]\niterations = 9\n[quick]"
+        heading = 'kind = "box"' if section == "scene" else "iterations = 9"
+        written = STUDY.replace("[quick]", budget).replace(heading, f"{heading}\n{field} = 1")
+        line = 1 + written.splitlines().index(f"{field} = 1")
+        told = f"{old}: this is called {new} now"
+        assert complaint(tmp_path, text=written) == f"/study.toml, line {line}: {told}"
+        assert complaint(tmp_path, ('"solver.order" =', f'"{old}" =')) == f"/study.toml, line 16: {told}"
+        assert complaint(tmp_path, overrides={old: 1}) == f"/study.toml, --set: {told}"
+        quick = complaint(tmp_path, ('"scene.side" = "right"', f'"{old}" = 1'), quick=True)
+        assert quick == f"/study.toml, line 25: {told}"
+
+    def test_record_is_no_list_any_more(self, tmp_path):
+        told = "record = [0.1, 0.2]: should be a table now: record = { times = [0.1, 0.2] }"
+        written = ("question", "record = [0.1, 0.2]\nquestion")
+        assert complaint(tmp_path, written) == f"/study.toml, line 1: {told}"
+        assert complaint(tmp_path, overrides={"record": [0.1, 0.2]}) == f"/study.toml, --set: {told}"
+
     def test_every_new_place_exists(self):
-        assert all(new.split(".")[0] in {*SECTIONS, *Frame.model_fields} for new in MOVED.values())
-        assert not any(old in {*SECTIONS, *Frame.model_fields} for old in MOVED)
+        known = {*Composer(REGISTRY).sections, *Frame.model_fields}
+        assert all(new.split(".")[0] in known for new in MOVED.values())
+        assert not any(old in known for old in MOVED)
+        parts = read_parts()
+        for new in MOVED.values():
+            section, *field = new.split(".")
+            assert not field or field[0] in type(getattr(parts, section)).model_fields, new
 
 
 class TestLines:

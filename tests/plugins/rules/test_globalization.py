@@ -245,7 +245,7 @@ def test_globalizations_are_swept_and_part_of_a_cases_identity() -> None:
     assert [case.label for case in cases] == [
         f"solver.globalization.kind = {k}" for k in ("none", "backtracking", "cubic")
     ]
-    assert [case.setup.solver.globalization for case in cases] == [FullSteps(), Backtracking(), Cubic()]  # type: ignore[attr-defined]
+    assert [case.parts.solver.globalization for case in cases] == [FullSteps(), Backtracking(), Cubic()]
     (short, long) = study([{"kind": "cubic", "trials": 2}, {"kind": "cubic"}]).cases
     assert short.id != long.id
     assert short.parameters["solver.globalization.trials"] == 2

@@ -23,7 +23,7 @@ from scipy.spatial import Delaunay, Voronoi, cKDTree
 
 from nlsolve import SolveError, Status
 from nlsolve.flow.continuation import Start
-from nlsolve.plugin import Cloud, ConstitutiveLaw, Scene
+from nlsolve.plugin import Cloud, ConstitutiveLaw, FlowScene
 from nlsolve.series import Array
 from nlsolve.solving.simulate import run_case as march
 from nlsolve.testing import check_scene
@@ -267,7 +267,7 @@ def same(found: Cloud, given: Cloud) -> None:
 
 
 @pytest.mark.parametrize("scene", [StirringTool(nodes=CIRCLES), Couette(nodes=CIRCLES), Channel(spacing=0.25)])
-def test_a_csv_file_gives_back_the_nodes_written_to_it(scene: Scene, tmp_path: Path) -> None:
+def test_a_csv_file_gives_back_the_nodes_written_to_it(scene: FlowScene, tmp_path: Path) -> None:
     cloud = scene.cloud(LAW)
     write_csv(tmp_path / "nodes.csv", cloud)
     from_file = scene.with_(nodes={"kind": "file", "path": str(tmp_path / "nodes.csv")})

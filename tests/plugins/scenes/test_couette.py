@@ -16,7 +16,7 @@ from scipy.integrate import quad
 
 from nlsolve.contracts.continuum.law import stress
 from nlsolve.flow.continuation import Start
-from nlsolve.plugin import ConstitutiveLaw, Exact, Scene
+from nlsolve.plugin import ConstitutiveLaw, Exact, FlowScene
 from nlsolve.series import Array
 from nlsolve.solving.simulate import run_case as march
 from nlsolve.testing import check_scene
@@ -35,7 +35,7 @@ LAWS: dict[str, ConstitutiveLaw] = {
 }
 
 
-def exact_of(scene: Scene, law: ConstitutiveLaw, radii: Array) -> Exact:
+def exact_of(scene: FlowScene, law: ConstitutiveLaw, radii: Array) -> Exact:
     exact = scene.exact(law, np.stack([radii, 0.0 * radii], axis=1), 0.0)
     assert exact is not None
     return exact
@@ -43,7 +43,7 @@ def exact_of(scene: Scene, law: ConstitutiveLaw, radii: Array) -> Exact:
 
 @pytest.mark.parametrize("kind", LAWS)
 @pytest.mark.parametrize("scene", [Couette(), Couette(tool_radius=1.0, plate_radius=1.2, nodes=Rings(spacing=0.1))])
-def test_the_scene_conforms(scene: Scene, kind: str) -> None:
+def test_the_scene_conforms(scene: FlowScene, kind: str) -> None:
     check_scene(scene, LAWS[kind])
 
 

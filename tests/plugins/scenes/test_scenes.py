@@ -6,6 +6,7 @@ from typing import Any, ClassVar, Literal
 
 import numpy as np
 import pytest
+from cases import setup
 from nlsolve_laws import PowerLaw
 from nlsolve_scenes import Channel, StirringTool
 from nlsolve_scenes.nodes.rings import GradedRings, Rings
@@ -14,7 +15,7 @@ from pydantic import ValidationError
 from nlsolve import SolveError, Status
 from nlsolve.contracts.continuum.law import stress
 from nlsolve.flow.continuation import Start
-from nlsolve.plugin import Cloud, ConstitutiveLaw, Scene
+from nlsolve.plugin import Cloud, ConstitutiveLaw, FlowScene, Misfit, NodeMotion, Physics, Recording, TimeSteps
 from nlsolve.testing import check_scene
 
 COARSE = Rings(spacing=0.5)
@@ -34,7 +35,7 @@ COARSE = Rings(spacing=0.5)
     ids=repr,
 )
 @pytest.mark.parametrize("index", [1.0, 0.1324])
-def test_scenes_conform(scene: Scene, index: float) -> None:
+def test_scenes_conform(scene: FlowScene, index: float) -> None:
     check_scene(scene, PowerLaw(index=index))
 
 
@@ -191,7 +192,7 @@ def test_no_exact_solution_where_there_is_none() -> None:
     assert StirringTool().exact(Newtonian(), points, 0.0) is None
     assert Channel().exact(Newtonian(), points, 0.0) is None
     with pytest.raises(ValueError, match="needs a power law"):
-        Channel().body_force(points, Newtonian())
+        Channel().body_force(points, Newtonian(), Physics())
 
 
 @pytest.mark.parametrize("index", [1.0, 0.5, 0.3, 0.1324])
@@ -209,7 +210,7 @@ def test_channel_profile_carries_the_mean_speed_and_balances_its_force(index: fl
     heights, h = np.linspace(-0.65, 0.65, 8), 1e-6
     shear = 0.5 * (speed(heights + h) - speed(heights - h)) / (2 * h)
     tau = stress(law, np.stack([0.0 * shear, 0.0 * shear, shear]))[2]
-    force = scene.body_force(np.zeros((1, 2)), law)
+    force = scene.body_force(np.zeros((1, 2)), law, Physics())
     np.testing.assert_allclose(tau, -force[0, 0] * heights, rtol=1e-5)
     assert force[0, 1] == 0.0
     np.testing.assert_allclose(speed(np.array([-0.7, 0.7])), 0.0, atol=1e-12)
@@ -217,20 +218,21 @@ def test_channel_profile_carries_the_mean_speed_and_balances_its_force(index: fl
 
 def test_penalty_is_measured_in_the_viscosity_at_the_reference_rate() -> None:
     law = PowerLaw(index=0.3)
-    assert StirringTool(penalty=50.0).penalty_modulus(law, np.zeros(1)) == pytest.approx(
+    rate = StirringTool().reference_rate
+    assert Physics(penalty=50.0).penalty_modulus(law, rate, np.zeros(1)) == pytest.approx(
         50.0 * law.viscosity(np.array([1e4]))[0]
     )
     rates = np.array([4.0, 9.0])
-    local = StirringTool(penalty=50.0, penalty_unit="local").penalty_modulus(law, rates)
+    local = Physics(penalty=50.0, penalty_unit="local").penalty_modulus(law, rate, rates)
     np.testing.assert_array_equal(local, 50.0 * law.viscosity(rates))
-    assert StirringTool(penalty=50.0, penalty_unit="absolute").penalty_modulus(law, rates) == 50.0
-    assert StirringTool().penalty_modulus(law, rates) == 0.0
+    assert Physics(penalty=50.0, penalty_unit="absolute").penalty_modulus(law, rate, rates) == 50.0
+    assert Physics().penalty_modulus(law, rate, rates) == 0.0
 
 
 def test_increments_of_a_march() -> None:
-    assert StirringTool().increments == 0
-    assert StirringTool(horizon=0.125).increments == 1250
-    assert StirringTool(horizon=1e-5).increments == 1
+    assert TimeSteps().increments == 0
+    assert TimeSteps(horizon=0.125).increments == 1250
+    assert TimeSteps(horizon=1e-5).increments == 1
 
 
 # Scenes that make no sense.
@@ -239,19 +241,18 @@ NONSENSE: list[tuple[type[Any], dict[str, Any], str]] = [
     (StirringTool, {"tool_radius": 6.0}, r"tool_radius = 6 mm must be smaller than plate_radius = 6 mm"),
     (StirringTool, {"tool_radius": 7.0, "plate_radius": 6.5}, "tool_radius = 7 mm must be smaller"),
     (StirringTool, {"tool_radius": -1.0}, "greater than 0"),
-    (StirringTool, {"increment": 0.0}, "greater than 0"),
-    (StirringTool, {"increment": -1e-4}, "greater than 0"),
-    (StirringTool, {"horizon": 0.0}, "greater than 0"),
-    (StirringTool, {"penalty": -1.0}, "greater than or equal to 0"),
-    (StirringTool, {"density": float("nan")}, "finite"),
+    (TimeSteps, {"increment": 0.0}, "greater than 0"),
+    (TimeSteps, {"increment": -1e-4}, "greater than 0"),
+    (TimeSteps, {"horizon": 0.0}, "greater than 0"),
+    (Physics, {"penalty": -1.0}, "greater than or equal to 0"),
+    (Physics, {"density": float("nan")}, "finite"),
     (StirringTool, {"angular_speed": float("inf")}, "finite"),
-    (StirringTool, {"probe": (float("nan"), 0.0)}, "finite"),
+    (Recording, {"probe": (float("nan"), 0.0)}, "finite"),
     (StirringTool, {"motion": "wobble"}, "'spin' or 'orbit'"),
     (StirringTool, {"nodes": {"kind": "rings", "spacing": 0.0}}, "greater than 0"),
     (StirringTool, {"nodes": {"kind": "rings", "spacing": float("nan")}}, "finite"),
     (StirringTool, {"nodes": {"kind": "ring"}}, "'rings', 'graded-rings'"),
     (StirringTool, {"speed": 1.0}, "Extra inputs are not permitted"),
-    (Channel, {"motion_of_nodes": "lagrangian"}, "material leaves the channel"),
     (Channel, {"jitter": 0.5}, "less than 0.5"),
     (Channel, {"half_height": 0.0}, "greater than 0"),
     (Start, {"tolerance": 0.0}, "greater than 0"),
@@ -265,6 +266,11 @@ def test_nonsense_is_refused_with_its_field_and_a_sentence(
     with pytest.raises(ValidationError, match=sentence) as refusal:
         component(**fields)
     assert any(name in str(refusal.value) for name in fields)
+
+
+def test_nodes_of_a_channel_stay() -> None:
+    with pytest.raises(Misfit, match=r'motion\.nodes: material leaves the channel; use nodes = "fixed"'):
+        Channel().check(setup(Channel(), motion=NodeMotion(nodes="lagrangian")))
 
 
 def test_a_cloud_with_a_hole_in_its_numbers_is_a_bad_cloud() -> None:

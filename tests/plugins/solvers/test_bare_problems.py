@@ -62,7 +62,7 @@ def test_a_method_that_needs_no_series_solves_a_problem_without_one(solver: Nonl
     assert outcome.status is Status.CONVERGED, outcome.detail
     np.testing.assert_allclose(outcome.state, ToyProblem.solution, atol=1e-9)
     assert ledger.counts["series_order"] == 0
-    assert all(np.isfinite(row["contraction"]) for row in outcome.steps[1:])
+    assert all(np.isfinite(row["contraction"]) for row in outcome.rows[1:])
 
 
 @pytest.mark.parametrize("solver", [AsymptoticNumericalMethod(), NewtonKrylov(products="series")], ids=lambda s: s.kind)

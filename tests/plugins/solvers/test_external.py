@@ -134,12 +134,9 @@ def test_given_its_matrix_hybr_takes_fewer_residuals() -> None:
 def test_the_reports_of_a_march_are_summed_beside_the_counts() -> None:
     study = {
         "question": "what is reported?",
-        "scene": {
-            "kind": "stirring-tool",
-            "nodes": {"kind": "rings", "spacing": 0.75},
-            "horizon": 3e-4,
-            "motion_of_nodes": "lagrangian",
-        },
+        "scene": {"kind": "stirring-tool", "nodes": {"kind": "rings", "spacing": 0.75}},
+        "time": {"horizon": 3e-4},
+        "motion": {"nodes": "lagrangian"},
         "law": {"kind": "power-law", "index": 0.5},
         "discretizer": {"kind": "mls"},
         "sweep": [{"grid": {"solver": [{"kind": "scipy-root", "method": "anderson"}, {"kind": "newton"}]}}],
