@@ -18,9 +18,9 @@ class Cavity(Rectangle):
     plain :   U = lid_speed, which jumps to zero in the corners (Ghia, Ghia & Shin 1982).
     smooth :  U = 16 ξ² (1 − ξ)² lid_speed, ξ = x/L: no singularity in the corners (Bourcier & François 1969).
 
-    Nothing flows in or out, so the flow needs a penalty, best with an iterated pressure (`divergence_tolerance`).
-    Nodes are scattered, for a regular grid carries a pressure that alternates from cell to cell and is stirred up by
-    the corners. With convection the Reynolds number is set by the density, Re = ρ lid_speed L/μ; see `reynolds`.
+    Walls enclose the material, so the flow needs a penalty, best with an iterated pressure (`divergence_tolerance`).
+    Nodes are scattered by default: on a regular grid the corners excite a pressure that alternates from cell to cell.
+    With convection the Reynolds number is set by the density, Re = ρ lid_speed L/μ; see `reynolds`.
     """
 
     kind: Literal["cavity"] = "cavity"
@@ -34,7 +34,7 @@ class Cavity(Rectangle):
     }
 
     def check(self, parts: Any) -> None:
-        """A pressure is needed."""
+        """Raises Misfit without a penalty, which a flow between walls needs."""
         super().check(parts)
         if not parts.physics.penalty:
             raise Misfit("physics", "penalty", "nothing flows in or out of a cavity, so its flow needs a penalty")

@@ -32,8 +32,10 @@ class EccentricCylinders(FlowScene):
     outer_spin: float = Field(0.0, description="ω_o, counter-clockwise [rad/s]")
     spacing: float = Field(0.1, gt=0, description="mean distance of nodes across the widest gap [mm]")
     grading: float = Field(0.7, gt=0, le=1, description="distance of circles at the walls over that in the middle")
-    jitter: float = Field(0.0, ge=0, lt=0.5, description="random shift of interior nodes, part of the nearest distance")
-    seed: int = Field(0, ge=0, description="of the random shifts")
+    jitter: float = Field(
+        0.0, ge=0, lt=0.5, description="random shift of interior nodes, as a fraction of the distance to the nearest"
+    )
+    seed: int = Field(0, ge=0, description="seed of the random shifts")
     keeps_nodes: ClassVar[str | None] = "nodes carried around the bearing crowd in its gap"
 
     @model_validator(mode="after")
@@ -82,7 +84,7 @@ class EccentricCylinders(FlowScene):
         return jittered(Cloud(nodes, groups), self.jitter, self.seed)
 
     def boundary_position(self, cloud: Cloud, time: float) -> np.ndarray:
-        """Circles that spin stay where they are."""
+        """Both circles stay where they are: a spin turns each into itself."""
         return cloud.nodes[cloud.boundary]
 
     def boundary_velocity(self, cloud: Cloud, law: ConstitutiveLaw, time: float) -> np.ndarray:

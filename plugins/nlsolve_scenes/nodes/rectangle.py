@@ -17,7 +17,7 @@ FIRST_ON_DIAGONAL = 0.75  # distance in x and in y of the first interior node fr
 
 
 class Rectangle(FlowScene):
-    """A flow in x₀ ≤ x ≤ x₀ + width, y₀ ≤ y ≤ y₀ + height, whose nodes stay where they are."""
+    """A flow in x₀ ≤ x ≤ x₀ + width, y₀ ≤ y ≤ y₀ + height, on fixed nodes."""
 
     spacing: float = Field(0.05, gt=0, description="mean distance of nodes [mm]")
     grading: float = Field(
@@ -27,8 +27,10 @@ class Rectangle(FlowScene):
         description="distance of nodes at the walls over that in the middle; on a grid 0.6 or more",
     )
     nodes: Literal["grid", "scattered"] = Field("grid", description="on grid lines, or scattered by repulsion")
-    jitter: float = Field(0.0, ge=0, lt=0.5, description="random shift of interior nodes, part of the nearest distance")
-    seed: int = Field(0, ge=0, description="of scattered nodes and of the random shifts")
+    jitter: float = Field(
+        0.0, ge=0, lt=0.5, description="random shift of interior nodes, as a fraction of the distance to the nearest"
+    )
+    seed: int = Field(0, ge=0, description="seed of scattered nodes and of the random shifts")
 
     keeps_nodes: ClassVar[str | None] = "boundary nodes would leave the rectangle"
 
