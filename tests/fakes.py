@@ -11,6 +11,7 @@ import pandas as pd
 from pydantic import Field
 from scipy.sparse import csc_array
 
+from nlsolve import Outcome, Status
 from nlsolve.flow.state import FlowParts
 from nlsolve.plugin import (
     Cloud,
@@ -235,4 +236,5 @@ def fake_march(
     fields = pd.DataFrame({"time": [0.1, 0.1], "node": [0, 1], "u": [1.0, 2.0]})
     tangents = round(-np.log10(tolerance)) * 100 // order
     summary = {"status": "converged", "message": "the stopping test was met", "tangents": tangents, "ordering": None}
-    return Record({**summary, "factorizations": 2, "velocity_error": float("nan")}, steps, fields)
+    outcome = Outcome(Status.CONVERGED, Status.CONVERGED.sentence, np.zeros(1), 0.0)
+    return Record({**summary, "factorizations": 2, "velocity_error": float("nan")}, outcome, steps, fields)

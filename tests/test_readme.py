@@ -44,7 +44,7 @@ def untimed(text: str) -> list[str]:
 
 def test_every_block_prints_what_is_shown(session):
     shown = [text for _, text in BLOCKS]
-    assert sum(map(bool, shown)) == 3
+    assert sum(map(bool, shown)) == 4
     for printed, text in zip(session[1], shown, strict=True):
         assert untimed(printed) == untimed(text)
 

@@ -15,7 +15,7 @@ from collections.abc import Callable, Generator, Mapping
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Protocol
 
 import pandas as pd
 
@@ -25,8 +25,11 @@ from nlsolve.contracts.outcome import Outcome
 from nlsolve.contracts.problem import NonlinearProblem
 from nlsolve.series import Array
 
-Entry = Callable[[str], AbstractContextManager[None]]
-"""`with entry("operators"): …` counts and times work of one kind in the books of the case."""
+
+class Entry(Protocol):
+    """`with entry("operators"): …` counts and times work of one kind in the books of the case."""
+
+    def __call__(self, kind: str) -> AbstractContextManager[None]: ...
 
 
 @dataclass(frozen=True)

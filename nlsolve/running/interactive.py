@@ -19,6 +19,9 @@ from nlsolve.running.checked_input import Formula, Given, Posed, Strategy, mista
 from nlsolve.solving.simulate import Record, crashed, simulate
 from nlsolve.solving.stopping import Budget, StoppingTest
 
+OF_A_MARCH = ("increments", "seconds_operators", "seconds_all")
+"""Columns of `runs` that say nothing of a single solve."""
+
 
 def solve(
     problem: Formula | System | NonlinearProblem,
@@ -79,7 +82,7 @@ def compare(
     names = [_label(strategy.solver) for strategy in chosen] if named is None else list(named)
     rows = [{"solver": name, **_row(posed, strategy)} for name, strategy in zip(names, chosen, strict=True)]
     frame = pd.DataFrame(rows, columns=["solver", *RUNS])
-    return frame.drop(columns=[name for name in RUNS if frame[name].isna().all()])
+    return frame.drop(columns=[name for name in RUNS if name in OF_A_MARCH or frame[name].isna().all()])
 
 
 def _solved(posed: Posed, strategy: Strategy) -> Record:

@@ -22,7 +22,7 @@ from nlsolve_solvers.modified_newton import ModifiedNewton
 from pydantic import TypeAdapter, ValidationError
 
 import nlsolve
-from nlsolve import SolveError, Status
+from nlsolve import Outcome, SolveError, Status
 from nlsolve.plugin import Factors, LinearSolver, NodeMotion, NonlinearProblem, Physics, TimeSteps
 from nlsolve.registry.problems import StudyError
 from nlsolve.results.columns import RUNS
@@ -539,7 +539,8 @@ def timed(monkeypatch: pytest.MonkeyPatch) -> list[float]:
         taken = seconds.pop(0)
         if taken < 0:
             raise ZeroDivisionError
-        return Record({"status": "converged", "message": "", "seconds": taken, "tangents": 1}, pd.DataFrame())
+        outcome = Outcome(Status.CONVERGED, "", np.zeros(1), 0.0)
+        return Record({"status": "converged", "message": "", "seconds": taken, "tangents": 1}, outcome, pd.DataFrame())
 
     monkeypatch.setattr("nlsolve.running.runner.run_case", march_of)
     return seconds

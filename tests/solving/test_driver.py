@@ -227,16 +227,16 @@ class Noting(NonlinearSolver):
 
 def test_a_note_without_a_column_is_kept_under_its_name() -> None:
     outcome, _ = run(IDENTITY, Noting(), None, ONE)
-    row = outcome.steps[1]
+    row = outcome.rows[1]
     assert (row["length"], row["note.shift"], row["note.why"]) == (0.5, 3.0, "because")
-    frame = steps_frame(outcome.steps)
+    frame = steps_frame(outcome.rows)
     assert list(frame.columns) == [*(name for name in STEPS if name != "case"), "note.shift", "note.why"]
     assert frame["note.shift"].tolist()[1:] == [3.0]
 
 
 def test_a_note_does_not_take_the_place_of_what_the_driver_measured() -> None:
     outcome, _ = run(IDENTITY, Noting(), None, ONE)
-    assert (outcome.steps[1]["step"], outcome.steps[1]["residual_norm"]) == (1, 0.5)
+    assert (outcome.rows[1]["step"], outcome.rows[1]["residual_norm"]) == (1, 0.5)
 
 
 # Stopping tests.

@@ -71,7 +71,7 @@ def test_a_stranger_factorises_a_matrix_of_its_own(solver: NonlinearSolver, rule
 
 def test_the_work_of_a_stranger_is_counted() -> None:
     outcome, ledger = run(ToyProblem(), Normal(), EveryIteration(), START, DenseLU())
-    k = len(outcome.steps) - 1
+    k = len(outcome.rows) - 1
     kinds = ("jacobian", "factorization", "triangular_solve", "matrix_product")
     assert [ledger.counts[kind] for kind in kinds] == [k, k, k, k]
 
@@ -121,16 +121,16 @@ def test_every_rule_works_with_a_method_that_says_nothing(rule: RefreshRule) -> 
     outcome, ledger = run(ToyProblem(), Silent(), rule, far, DenseLU())
     kept, kept_ledger = run(ToyProblem(), Silent(), Never(), far, DenseLU())
     assert outcome.status is kept.status is Status.CONVERGED
-    assert 1 < ledger.counts["factorization"] < len(outcome.steps) - 1
-    assert len(outcome.steps) < len(kept.steps)
+    assert 1 < ledger.counts["factorization"] < len(outcome.rows) - 1
+    assert len(outcome.rows) < len(kept.rows)
     assert kept_ledger.counts["factorization"] == 1
 
 
 def test_the_driver_measures_what_a_step_left_of_the_residual() -> None:
     problem, rule = ToyProblem(), Watching(seen=[])
     outcome, _ = run(problem, Silent(), rule, START, DenseLU())
-    sizes = [row["residual_norm"] for row in outcome.steps]
-    column = [row["contraction"] for row in outcome.steps]
+    sizes = [row["residual_norm"] for row in outcome.rows]
+    column = [row["contraction"] for row in outcome.rows]
     assert np.isnan(column[0])
     np.testing.assert_allclose(column[1:], np.divide(sizes[1:], sizes[:-1]), rtol=1e-14)
     assert rule.seen == [None, *column[1:-1]][1:]  # the rule is asked from the second iteration on
@@ -172,8 +172,8 @@ def test_a_methods_own_note_of_the_contraction_wins(solver: NonlinearSolver) -> 
     """Per inner iteration, or per order, and not that of the whole step."""
     rule = Watching(seen=[])
     outcome, _ = run(ToyProblem(), solver, rule, START + 1.0, DenseLU())
-    column = [row["contraction"] for row in outcome.steps[1:]]
-    sizes = np.array([row["residual_norm"] for row in outcome.steps])
+    column = [row["contraction"] for row in outcome.rows[1:]]
+    sizes = np.array([row["residual_norm"] for row in outcome.rows])
     assert column[0] != pytest.approx(sizes[1] / sizes[0], rel=0.1)
     assert rule.seen[0] == column[0]
 
@@ -181,4 +181,4 @@ def test_a_methods_own_note_of_the_contraction_wins(solver: NonlinearSolver) -> 
 @pytest.mark.parametrize("solver", [Newton(), LevenbergMarquardt()], ids=lambda solver: solver.kind)
 def test_the_contraction_of_every_step_is_in_the_table(solver: NonlinearSolver) -> None:
     outcome, _ = run(ToyProblem(), solver, EveryIteration(), START, DenseLU())
-    assert np.isfinite([row["contraction"] for row in outcome.steps[1:]]).all()
+    assert np.isfinite([row["contraction"] for row in outcome.rows[1:]]).all()

@@ -31,7 +31,7 @@ class Half(NonlinearSolver):
         state = start
         while True:
             yield Step(state)
-            tangent.refresh_if_due(problem, state)
+            tangent.refresh_if_due(lambda: problem.jacobian(state))
             state = state - self.length * tangent.solve(problem.residual(state))
 
 

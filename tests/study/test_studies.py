@@ -455,7 +455,7 @@ class TestMoved:
         assert complaint(tmp_path, overrides={"record": [0.1, 0.2]}) == f"/study.toml, --set: {told}"
 
     def test_every_new_place_exists(self):
-        known = {*Composer(REGISTRY).sections, *Frame.model_fields}
+        known = {*Composer(REGISTRY, {}).sections, *Frame.model_fields}
         assert all(new.split(".")[0] in known for new in MOVED.values())
         assert not any(old in known for old in MOVED)
         parts = read_parts()

@@ -4,7 +4,7 @@
 The residual is one formula that runs on arrays and on series, so the homotopy takes part; the Jacobian is assembled by
 scikit-fem.
 
-    python docs/examples/p_laplace_by_scikit_fem.py
+    python examples/p_laplace_by_scikit_fem.py
 """
 
 from __future__ import annotations
