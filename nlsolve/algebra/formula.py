@@ -51,6 +51,11 @@ class FormulaProblem(NonlinearProblem):
         self._formula, self._given, self._columns = formula, jacobian, columns
         self._compression = Compression(pattern, size)
 
+    @property
+    def has_series(self) -> bool:
+        """Taken to be so without a given Jacobian, which says that the formula gives none."""
+        return self._given is None
+
     def residual(self, u: Array) -> Array:
         """F(u). Raises InputError where that is no (U,) array of real numbers."""
         return real(self._formula(u), u.shape, "F(u)")

@@ -79,7 +79,7 @@ def measure(
 ) -> UnitCosts:
     """Medians of rounds in which every kind of work is done in turn, as a method does it, around a state (U,).
 
-    Raises SolveError where the tangent there cannot be factorised.
+    A problem without series costs nothing for them. Raises SolveError where the tangent there cannot be factorised.
     """
     watch = _Watch(clock)
     begun = clock()
@@ -89,13 +89,14 @@ def measure(
             break
         matrix = watch("jacobian", problem.jacobian, state)
         factors = watch("factorization", linear.factorize, matrix, factors)
-        expansion = watch("expansion", _begun, problem, state)
+        expansion = watch("expansion", _begun, problem, state) if problem.has_series else None
         for j in range(1, ORDER + 1):
             rhs = watch("residual", problem.residual, PART_OF_STATE * state)
             solution = watch("triangular_solve", factors.solve, rhs)
             watch("matrix_product", operator.matmul, matrix, solution)
-            expansion.append(RATIO_OF_TERMS**j * state)
-            watch(f"order {j}", expansion.coefficient, j)
+            if expansion is not None:
+                expansion.append(RATIO_OF_TERMS**j * state)
+                watch(f"order {j}", expansion.coefficient, j)
     orders = np.arange(1, ORDER + 1)
     growth = np.stack([np.ones(ORDER), orders], axis=1)
     (series_order, series_term), _ = scipy.optimize.nnls(growth, np.array([watch.median(f"order {j}") for j in orders]))
@@ -126,4 +127,5 @@ class _Watch:
         return result
 
     def median(self, kind: str) -> float:
-        return statistics.median(self._seconds[kind])
+        """Of this kind; 0 where none was done, as of series by a problem that has none."""
+        return statistics.median(self._seconds[kind] or [0.0])
