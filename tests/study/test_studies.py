@@ -318,6 +318,18 @@ class TestComplaints:
         message = complaint(tmp_path, ("[solver]", '[start]\nby = "idx"\n[solver]'))
         assert "line 13: start.by = 'idx': the law 'honey' is continued by index only" in message
 
+    def test_sections_that_do_not_fit_together(self, tmp_path):
+        wrong = ("[solver]", '[physics]\nconvection = true\n[motion]\nnodes = "lagrangian"\n[solver]')
+        message = complaint(tmp_path, wrong)
+        assert message == (
+            "/study.toml, line 13: physics.convection = True: nodes that move with the material carry it already; "
+            'use motion.nodes = "fixed"'
+        )
+        right = wrong[0], wrong[1].replace("lagrangian", "fixed")
+        assert read(tmp_path, right).cases[0].parts.physics.convection
+        moving = {"motion.nodes": "lagrangian"}
+        assert "/study.toml, line 13: physics.convection = True" in complaint(tmp_path, right, overrides=moving)
+
     def test_tables_name_columns_that_exist(self, tmp_path):
         message = complaint(tmp_path, ('value = "tangents"', 'value = "tangnts"'))
         assert "line 22: table[0].value = 'tangnts': no such column of the results; did you mean 'tangents'?" in message

@@ -20,7 +20,7 @@ from nlsolve_solvers.modified_newton import ModifiedNewton
 from nlsolve import SolveError, Status
 from nlsolve.flow.continuation import Start
 from nlsolve.flow.momentum import Flow
-from nlsolve.plugin import Discretizer
+from nlsolve.plugin import Discretizer, Physics
 from nlsolve.series import Array
 from nlsolve.solving.counted_problem import CountedProblem
 from nlsolve.solving.driver import solve
@@ -183,11 +183,12 @@ def test_a_strong_form_has_no_potential(solver: Newton) -> None:
 
 
 def test_a_case_that_is_refused_is_a_row_with_the_sentence() -> None:
-    for scene, discretizer in (
-        (StirringTool(nodes=Rings(spacing=0.75)), MovingLeastSquares()),
-        (StirringTool(nodes=Rings(spacing=0.75), convection=True), LinearTriangles()),
+    scene = StirringTool(nodes=Rings(spacing=0.75))
+    for physics, discretizer in (
+        (Physics(), MovingLeastSquares()),
+        (Physics(convection=True), LinearTriangles()),
     ):
-        row = march(setup(scene, 0.5, solver=ENERGY, discretizer=discretizer)).summary
+        row = march(setup(scene, 0.5, physics=physics, solver=ENERGY, discretizer=discretizer)).summary
         assert row["status"] == "not applicable"
         assert REFUSAL in row["message"]
 

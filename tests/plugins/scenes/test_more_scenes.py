@@ -18,8 +18,10 @@ from scipy.spatial import cKDTree
 from nlsolve import SolveError, Status
 from nlsolve.contracts.continuum.law import stress
 from nlsolve.plugin import ConstitutiveLaw, FlowScene, Misfit, NodeMotion, Physics
+from nlsolve.registry.problems import StudyError
 from nlsolve.series import Array
 from nlsolve.solving.simulate import run_case as march
+from nlsolve.study.study import Study
 from nlsolve.testing import check_scene
 
 VISCOUS = NortonHoff(consistency=1.0, index=1.0)  # μ = 1 MPa s
@@ -417,3 +419,24 @@ MISFITS: list[tuple[FlowScene, dict[str, Any], str]] = [
 def test_sections_that_do_not_fit_the_scene(scene: FlowScene, sections: dict[str, Any], sentence: str) -> None:
     with pytest.raises(Misfit, match=sentence):
         scene.check(setup(scene, **sections))
+
+
+def test_a_cavity_of_a_study_has_a_pressure_by_default() -> None:
+    document: dict[str, Any] = {
+        "question": "?",
+        "scene": {"kind": "cavity"},
+        "law": {"kind": "norton-hoff"},
+        "discretizer": {"kind": "mls"},
+        "solver": {"kind": "newton"},
+    }
+
+    def physics(**fields: Any) -> Physics:
+        return Study.from_dict(document | {"physics": fields}).cases[0].parts.physics
+
+    iterated = Physics(penalty=1000.0, divergence_tolerance=1e-6)
+    assert Study.from_dict(document).cases[0].parts.physics == physics() == iterated
+    assert physics(density=2.0, convection=True) == iterated.with_(density=2.0, convection=True)
+    assert physics(penalty=10.0).penalty == 10.0
+    alone = Physics(penalty=0.0)
+    with pytest.raises(StudyError, match=r"physics\.penalty = 0\.0: nothing flows in or out of a cavity"):
+        Study.from_dict(document | {"physics": alone})
