@@ -22,7 +22,7 @@ from nlsolve.plugin import Solve, TimeSteps
 from nlsolve.registry.problems import StudyError
 from nlsolve.solving.simulate import run_case as march
 from nlsolve.solving.stopping import Budget
-from nlsolve.testing.toy_problem import SmallProblem
+from nlsolve.testing.toy_problem import ToyProblem
 
 COARSE = Rings(spacing=0.5)
 LAW = PowerLaw(index=0.1, regularization=1e-3)
@@ -49,7 +49,7 @@ def walked(start: Start, end: Callable[[Stage], Outcome]) -> tuple[Outcome, Stag
 
     def solve(stage: Stage, last: bool) -> Solves:
         stages.append(stage)
-        return (yield Solve(SmallProblem(), SmallProblem.solution))
+        return (yield Solve(ToyProblem(), ToyProblem.solution))
 
     way = walk(start, LAW, solve)
     try:

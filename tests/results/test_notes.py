@@ -6,16 +6,15 @@ from collections.abc import Iterator
 from typing import Any
 
 import pytest
-from cases import PLAIN, setup
+from cases import PLAIN, SystemParts, setup
 from nlsolve_rules.refresh import EveryIteration
 from nlsolve_scenes import StirringTool
 from nlsolve_scenes.nodes.rings import Rings
 from nlsolve_solvers import Newton
 from nlsolve_systems import Published
 
-from nlsolve.algebra.root_search import AlgebraicSetup, solve_system
-from nlsolve.flow.march import march
 from nlsolve.plugin import Step
+from nlsolve.solving.simulate import run_case
 
 
 class Numbered(Newton):
@@ -27,9 +26,9 @@ class Numbered(Newton):
 
 
 RECORDS = {
-    "flow": lambda: march(setup(StirringTool(nodes=Rings(spacing=0.75)), solver=Numbered())),
-    "system": lambda: solve_system(
-        AlgebraicSetup(scene=Published(problem="wood"), linear=PLAIN, solver=Numbered(), refresh=EveryIteration())
+    "flow": lambda: run_case(setup(StirringTool(nodes=Rings(spacing=0.75)), solver=Numbered())),
+    "system": lambda: run_case(
+        SystemParts(scene=Published(problem="wood"), linear=PLAIN, solver=Numbered(), refresh=EveryIteration())
     ),
 }
 
