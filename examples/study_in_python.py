@@ -5,7 +5,7 @@ import nlsolve
 results = nlsolve.run(
     {
         "question": "How many Jacobians does each strategy assemble on its way to a root?",
-        "scene": {"kind": "system", "problem": "powell-singular"},
+        "scene": {"kind": "published", "problem": "powell-singular"},
         "solver": {"kind": "newton"},
         "stop": {"kind": "residual", "tolerance": 1e-9},
         "sweep": [

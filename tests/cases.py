@@ -68,7 +68,6 @@ def setup(scene: Geometry, index: float = 0.5, **parts: Any) -> FlowParts:
         "linear": PLAIN,
         "solver": Newton(),
         "refresh": EveryIteration(),
-        "starter": Newton(),
         "predictor": Previous(),
         "stop": StoppingTest(tolerance=1e-10),
     }

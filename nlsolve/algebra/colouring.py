@@ -11,7 +11,7 @@ from nlsolve.contracts.continuum.cloud import Indices
 from nlsolve.series import Array
 
 
-class Compression:
+class Colouring:
     """The columns of a pattern in C groups.
 
     seeds : S, (U, C); S_jc = 1 where column j belongs to group c. Without a pattern each column is a group of its own.

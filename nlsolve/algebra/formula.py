@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 
-from nlsolve.algebra.colouring import Compression
+from nlsolve.algebra.colouring import Colouring
 from nlsolve.contracts.problem import Expansion, NonlinearProblem
 from nlsolve.contracts.status import InputError, SolveError, Status
 from nlsolve.series import Array, Series
@@ -49,7 +49,7 @@ class FormulaProblem(NonlinearProblem):
     ) -> None:
         self.is_gradient = is_gradient
         self._formula, self._given, self._columns = formula, jacobian, columns
-        self._compression = Compression(pattern, size)
+        self._colouring = Colouring(pattern, size)
 
     @property
     def has_series(self) -> bool:
@@ -64,7 +64,7 @@ class FormulaProblem(NonlinearProblem):
         """J(u), sparse (U, U). Raises SolveError (not applicable) where there is none, InputError for a wrong one."""
         if self._given is not None:
             return _matrix(self._given(u), len(u))
-        return self._compression.unpack(self.derivative(u, self._compression.seeds))
+        return self._colouring.unpack(self.derivative(u, self._colouring.seeds))
 
     def expand(self, u: Array) -> Expansion:
         """The formula run on a series that begins with u. Raises SolveError (not applicable) where it cannot be."""

@@ -11,11 +11,11 @@ from pydantic import Field, ValidationInfo, field_validator
 
 from nlsolve.contracts.component import Component
 from nlsolve.contracts.continuum.law import ConstitutiveLaw
-from nlsolve.contracts.nonlinear_solver import NonlinearSolver
 from nlsolve.contracts.outcome import Outcome
 from nlsolve.contracts.scene import Preparation, Solve
 from nlsolve.contracts.status import Status
 from nlsolve.flow.momentum import Flow
+from nlsolve.registry.nested import AnySolver
 from nlsolve.series import Array
 
 LOAD = "load"
@@ -36,7 +36,7 @@ class Stage:
 class Start(Component):
     """The first state is solved with `by` at each of `values` that is easier than the target, then at the target.
 
-    `by` is one of the fields by which the law is continued, or "load" (a smaller one is easier). The starting method
+    `by` is one of the fields by which the law is continued, or "load" (a smaller one is easier). The method `solver`
     solves the stages, with a new tangent each iteration; its work is counted apart from the march (columns `start_…`).
     An adaptive continuation begins with the first of `values`, tries the second next, and goes on in steps of
     log(`by`), halved where a stage fails and doubled where it was easy. With no values, the case's own method solves a
@@ -57,6 +57,9 @@ class Start(Component):
     smallest: float = Field(0.01, gt=0, lt=1, description="adaptive: shortest step, as part of the way in log(by)")
     iterations: int = Field(25, gt=0, description="adaptive: iterations after which a stage has failed")
     tolerance: float = Field(1e-10, gt=0, description="relative residual of the first state")
+    solver: AnySolver = Field(  # type: ignore[assignment]
+        {"kind": "newton"}, description="the method that solves the stages, the same for every strategy"
+    )
     perturbation: float = Field(
         0.0, ge=0, description="ε, size of a random change of the case's own first guesses over that of the velocity"
     )
@@ -92,10 +95,10 @@ class Start(Component):
             )
         return stages
 
-    def preparation(self, starter: NonlinearSolver, iterations: int) -> Preparation:
-        """How one stage is solved, by the starting method within its budget of iterations."""
+    def preparation(self, iterations: int) -> Preparation:
+        """How one stage is solved: by the method of the start, in at most this many iterations, or fewer of its own."""
         most = min(self.iterations, iterations) if self.adaptive else iterations
-        return Preparation(starter, self.tolerance, most)
+        return Preparation(self.solver, self.tolerance, most)
 
     def between(self, first: Stage, target: Stage, part: float) -> Stage:
         """The stage at log-interpolated `by`; part = 0: first, part = 1: target."""

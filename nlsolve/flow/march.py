@@ -103,7 +103,7 @@ class FlowSimulation(Simulation):
     def prepare(self, stage: Stage) -> Solves:
         """One stage on the way to the first state."""
         flow = self.state.flow_of(stage.law, load=stage.load)
-        preparation = self.parts.start.preparation(self.parts.starter, self.parts.budget.iterations)
+        preparation = self.parts.start.preparation(self.parts.budget.iterations)
         return (yield Solve(flow, flow.unknowns(self.state.guess), preparation=preparation))
 
     def advance(self, k: int) -> Solves:

@@ -12,7 +12,6 @@ from nlsolve.contracts.continuum.discretizer import Discretizer
 from nlsolve.contracts.continuum.geometry import Geometry
 from nlsolve.contracts.continuum.law import ConstitutiveLaw
 from nlsolve.contracts.continuum.terms import NodeMotion, Physics, Recording, TimeSteps
-from nlsolve.contracts.nonlinear_solver import NonlinearSolver
 from nlsolve.contracts.rules.predictor import Predictor
 from nlsolve.contracts.scene import Entry, Misfit, Scene, Section
 from nlsolve.flow.continuation import LOAD, Start
@@ -31,7 +30,6 @@ class FlowScene(Geometry, Scene, ABC):
         "discretizer": Section(Discretizer),
         "error_estimator": Section(Discretizer, of="discretizer"),
         "start": Section(Start),
-        "starter": Section(NonlinearSolver, {"kind": "newton"}),
         "predictor": Section(Predictor),
         "record": Section(Recording),
     }

@@ -36,7 +36,6 @@ class FlowParts:
     linear: LinearSolver
     solver: NonlinearSolver
     refresh: RefreshRule
-    starter: NonlinearSolver
     predictor: Predictor
     error_estimator: Discretizer | None = None
     physics: Physics = field(default_factory=Physics)

@@ -11,6 +11,7 @@ from typing import Annotated, Any
 from pydantic import BeforeValidator, SerializeAsAny
 
 from nlsolve.contracts.component import Component
+from nlsolve.contracts.nonlinear_solver import NonlinearSolver
 from nlsolve.contracts.rules.globalization import Globalization
 from nlsolve.registry.registry import load_registry
 
@@ -26,3 +27,6 @@ def installed(contract: type[Component]) -> BeforeValidator:
 
 Globalized = Annotated[SerializeAsAny[Globalization], installed(Globalization)]
 """The type of a field that holds a globalisation."""
+
+AnySolver = Annotated[SerializeAsAny[NonlinearSolver], installed(NonlinearSolver)]
+"""The type of a field that holds a nonlinear solver."""

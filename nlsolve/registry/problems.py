@@ -23,6 +23,7 @@ ABSENT = object()
 
 MOVED: dict[str, str] = {
     "counterpart": "error_estimator",
+    "starter": "start.solver",
     "scene.horizon": "time.horizon",
     "scene.increment": "time.increment",
     "scene.density": "physics.density",
@@ -107,12 +108,19 @@ def did_you_mean(name: str, names: Iterable[str]) -> str:
     return f"did you mean {nearest[0]!r}?" if nearest else f"there are {', '.join(map(repr, names)) or 'none'}"
 
 
+def moved_name(name: str) -> str | None:
+    """What a dotted name of an older study file is called now; None where it has not moved."""
+    for old, new in MOVED.items():
+        if f"{name}.".startswith(f"{old}."):
+            return f"{new}{name.removeprefix(old)}"
+    return None
+
+
 def unknown(place: Place, value: Any, reason: str, names: Iterable[str]) -> Problem:
     """A name that there is not: what it is called now if it had its place once, else `reason` and the nearest name."""
     name = dotted(place)
-    for old, new in MOVED.items():
-        if f"{name}.".startswith(f"{old}."):
-            return Problem(place, ABSENT, f"this is called {new}{name.removeprefix(old)} now")
+    if (moved := moved_name(name)) is not None:
+        return Problem(place, ABSENT, f"this is called {moved} now")
     return Problem(place, value, f"{reason}; {did_you_mean(str(place[-1]).split('.')[0], names)}")
 
 

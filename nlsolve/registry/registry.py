@@ -47,6 +47,10 @@ CONTRACTS: dict[str, type[Component]] = {
 """What a plugin may offer, by noun, in the order of a study file."""
 
 
+RENAMED_KINDS = {("scene", "system"): "published"}
+"""Kinds of older study files, by noun, and what they are called now."""
+
+
 @dataclass(frozen=True)
 class Parameter:
     """One field of a component, for people to read."""
@@ -157,6 +161,8 @@ class Registry:
         if offers:
             both = " and ".join(offer.source for offer in offers)
             return f"{noun} {kind!r} is offered by {both}: uninstall all but one"
+        if isinstance(kind, str) and (noun, kind) in RENAMED_KINDS:
+            return f"this kind is called {RENAMED_KINDS[noun, kind]!r} now"
         nearest = get_close_matches(str(kind), classes, n=1)
         guess = f"did you mean {nearest[0]!r}? " if nearest else ""
         failed = f"; {len(self._failures)} plugin(s) failed, see `nlsolve plugins`" if self._failures else ""

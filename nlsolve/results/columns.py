@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any
 
-from nlsolve.registry.problems import did_you_mean
+from nlsolve.registry.problems import did_you_mean, moved_name
 
 
 @dataclass(frozen=True)
@@ -309,6 +309,7 @@ RENAMED: Mapping[str, str] = MappingProxyType(
 
 def no_such_column(name: str, known: Iterable[str]) -> str:
     """The sentence for a name that is no column: what the column is called now, or the nearest of the names `known`."""
-    if name in RENAMED:
-        return f"this column is called {RENAMED[name]} now"
+    present = RENAMED.get(name) or moved_name(name)
+    if present is not None:
+        return f"this column is called {present} now"
     return f"no such column of the results; {did_you_mean(name, known)}"

@@ -39,7 +39,7 @@ SAMPLE = [
 ]
 
 
-METHOD = ("solver", "refresh", "predictor", "starter", "stop", "budget", "record")
+METHOD = ("solver", "refresh", "predictor", "stop", "budget", "record")
 """Sections that do not change what a unit of work costs."""
 
 

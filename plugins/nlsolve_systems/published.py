@@ -15,7 +15,7 @@ from nlsolve_systems.catalogue import PROBLEMS, Listed
 class Published(System):
     """A problem of the catalogue, by name; formulas and sources are in `more_garbow_hillstrom` and `burkardt`."""
 
-    kind: Literal["system"] = "system"
+    kind: Literal["published"] = "published"
     problem: str = Field(description=f"one of {', '.join(PROBLEMS)}")
     size: int | None = Field(
         None, gt=0, description="U, unknowns of a problem that has several sizes; absent: as published"

@@ -20,7 +20,7 @@ from pydantic import Field
 from typer.testing import CliRunner
 
 import nlsolve
-from nlsolve.algebra.colouring import Compression, groups_of
+from nlsolve.algebra.colouring import Colouring, groups_of
 from nlsolve.algebra.root_search import displacement, root_error
 from nlsolve.cli.app import app
 from nlsolve.contracts.status import Status
@@ -130,10 +130,10 @@ def test_a_matrix_comes_back_from_its_groups() -> None:
     random = np.random.default_rng(3)
     pattern = sp.random_array((30, 30), density=0.1, rng=random) + sp.eye_array(30)
     matrix = sp.csr_array(pattern) * 2.5
-    compression = Compression(pattern, 30)
+    compression = Colouring(pattern, 30)
     assert compression.seeds.shape[1] < 30
     np.testing.assert_array_equal(compression.unpack(matrix @ compression.seeds).toarray(), matrix.toarray())
-    dense = Compression(None, 30)
+    dense = Colouring(None, 30)
     np.testing.assert_array_equal(dense.unpack(matrix @ dense.seeds).toarray(), matrix.toarray())
 
 
@@ -347,7 +347,7 @@ def test_the_last_method_tells_how_it_ended() -> None:
 
 
 def test_anderson_mixes_no_more_changes_than_there_are_unknowns() -> None:
-    study = {"question": "?", "scene": {"kind": "system", "problem": "scalar"}, "solver": {"kind": "anderson"}}
+    study = {"question": "?", "scene": {"kind": "published", "problem": "scalar"}, "solver": {"kind": "anderson"}}
     (run,) = nlsolve.run(study | {"stop": {"tolerance": 1e-9}}).runs.itertuples()
     assert run.status == "converged"
 
@@ -382,9 +382,7 @@ def registry() -> Registry:
 def test_a_study_of_ones_own_system(registry: Registry, tmp_path: Path) -> None:
     study = Study.from_dict(STUDY, registry=registry)
     assert [case.label for case in study.cases] == ["scene.radius = 1.0", "scene.radius = 2.0"]
-    assert not any(
-        name.startswith(("law.", "discretizer.", "starter.", "start.")) for name in study.cases[0].parameters
-    )
+    assert not any(name.startswith(("law.", "discretizer.", "start.")) for name in study.cases[0].parameters)
     assert study.cases[0].parameters["refresh.kind"] == "every-iteration"
     results = nlsolve.run(study, tmp_path / "out")
     assert results.runs["status"].tolist() == ["converged"] * 2
@@ -402,14 +400,14 @@ def test_a_study_of_ones_own_system(registry: Registry, tmp_path: Path) -> None:
             "law: the scene 'half-known' has no such section: leave it out",
         ),
         ({"discretizer": {"kind": "mls"}}, "discretizer: the scene 'half-known' has no such section"),
-        ({"starter": {"kind": "newton"}}, "starter: the scene 'half-known' has no such section"),
+        ({"start": {"adaptive": True}}, "start: the scene 'half-known' has no such section"),
         ({"start": {"tolerance": 1e-3}}, "start: the scene 'half-known' has no such section"),
         ({"record": {"times": [0.1]}}, "record: the scene 'half-known' has no such section"),
         ({"scene": {"kind": "half-known", "radus": 1.0}}, "no such field; did you mean 'radius'"),
         ({"stop": {"kind": "claim"}}, "the solver 'newton' never claims a solution"),
         ({"scene": {"kind": "half-know"}}, "no such scene; did you mean 'half-known'"),
         ({"scene": {"kind": "couette"}, "sweep": []}, "law: required, and missing"),
-        ({"scene": {"kind": "system", "problem": "woods"}, "sweep": []}, "did you mean 'wood'"),
+        ({"scene": {"kind": "published", "problem": "woods"}, "sweep": []}, "did you mean 'wood'"),
     ],
 )
 def test_what_a_study_of_systems_may_not_say(registry: Registry, extra: dict[str, Any], sentence: str) -> None:

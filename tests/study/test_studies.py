@@ -70,7 +70,7 @@ class TestCases:
         case = read(tmp_path, ("[solver]", "[linear]\nrefinement = 2\n[refresh]\nm = 9\n[solver]")).cases[0]
         assert (case.parts.linear.kind_name(), case.parts.linear.refinement) == ("superlu", 2)
         assert (case.parts.refresh.kind_name(), case.parameters["refresh.m"]) == ("every-m", 9)
-        assert case.parts.starter.kind_name() == "newton"
+        assert case.parts.start.solver.kind_name() == "newton"
 
     def test_parameters_are_flat_and_lists_are_text(self, tmp_path):
         parameters = read(tmp_path, ("question", "record = { times = [0.5] }\nquestion")).cases[0].parameters
@@ -459,6 +459,17 @@ class TestMoved:
         assert complaint(tmp_path, overrides={old: 1}) == f"/study.toml, --set: {told}"
         quick = complaint(tmp_path, ('"scene.side" = "right"', f'"{old}" = 1'), quick=True)
         assert quick == f"/study.toml, line 25: {told}"
+
+    def test_a_column_of_a_table_that_has_moved(self, tmp_path):
+        message = complaint(tmp_path, ('rows = "solver.order"', 'rows = "scene.penalty"'))
+        assert (
+            message
+            == "/study.toml, line 20: table[0].rows = 'scene.penalty': this column is called physics.penalty now"
+        )
+
+    def test_a_kind_that_has_another_name_now(self, tmp_path):
+        message = complaint(tmp_path, ('kind = "box"', 'kind = "system"'))
+        assert message == "/study.toml, line 4: scene.kind = 'system': this kind is called 'published' now"
 
     def test_record_is_no_list_any_more(self, tmp_path):
         told = "record = [0.1, 0.2]: should be a table now: record = { times = [0.1, 0.2] }"

@@ -21,7 +21,6 @@ OF_THE_METHOD = (
     "stop",
     "budget",
     "start",
-    "starter",
     "record",
     "counterpart",
     "error_estimator",

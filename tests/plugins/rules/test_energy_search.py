@@ -105,7 +105,7 @@ def test_the_whole_march_from_rest_without_continuation() -> None:
     for discretizer in (LinearTriangles(), MovingLeastSquares(form="conservative")):
         scene = StirringTool(nodes=Rings(spacing=0.5))
         parts: dict[str, Any] = {"discretizer": discretizer, "start": AT_ONCE}
-        row = march(setup(scene, 0.1324, solver=ENERGY, starter=ENERGY, **parts)).summary
+        row = march(setup(scene, 0.1324, solver=ENERGY, start=Start(solver=ENERGY), **parts)).summary
         assert row["status"] == "converged", row["message"]
         assert row["start_factorizations"] == 1
 
