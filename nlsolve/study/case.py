@@ -105,7 +105,13 @@ class Composer:
     def parts(self, document: Document) -> BaseModel:
         """The validated components of all sections, those left out at their defaults."""
         scene = self.named(document, Scene.noun, Scene)
-        sections = sections_of(scene) if issubclass(scene, Scene) else self._all
+        if issubclass(scene, Scene):
+            sections = sections_of(scene)
+        elif scene is Component:  # nobody knows what it needs: the mistakes in all there might be are told
+            sections = self._all
+        else:  # an instance of another contract
+            sections = {}
+            document = {Scene.noun: document[Scene.noun]}
         needless = [name for name in document if name not in (Scene.noun, *sections)]
         if needless:
             raise Invalid(
