@@ -110,10 +110,10 @@ def _at_wall(wall: Indices, flow: Flow, u: Array) -> tuple[float, float, float]:
     w[0, wall, 0] = w[1, wall, 1] = 1.0
     w[2, wall, 0], w[2, wall, 1] = -y, x
     shifts = w.reshape(3, -1).T
-    power = (strain.weights * flow.stress_at_points(u).ravel()) @ (strain.rate @ shifts)
+    power = (strain.weights() * flow.stress_at_points(u).ravel()) @ (strain.rate @ shifts)
     pressure = flow.pressure(u)
     if pressure is not None and volumetric is not None:
-        power = power - (volumetric.weights * pressure) @ (volumetric.rate @ shifts)
+        power = power - (volumetric.weights() * pressure) @ (volumetric.rate @ shifts)
     return float(power[0]), float(power[1]), float(power[2])
 
 

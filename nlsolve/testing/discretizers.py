@@ -78,7 +78,7 @@ def _check_adjoint(operators: Operators, free: Array) -> None:
     assert operators.node_areas is not None
     for name, pair in (("S = −Bᵀ A", operators.strain), ("S_θ = −B_θᵀ A_θ", operators.volumetric)):
         assert pair.areas is not None
-        expected = -(pair.rate[:, free].T @ sp.diags_array(pair.weights))
+        expected = -(pair.rate[:, free].T @ sp.diags_array(pair.weights()))
         same(abs(pair.force - expected).max(), 0.0, float(abs(expected).max()), name, 1e-13)
         require(np.min(pair.areas) >= 0.0, f"{name}: an area is negative")
     require(np.min(operators.node_areas, initial=1.0) > 0.0, "the material around an interior node has no area")

@@ -51,7 +51,6 @@ class PointOperators:
         weighed = sp.diags_array(_weights(areas, rate.shape[0] // len(points)))
         return cls(rate, (-(rate[:, free].T @ weighed)).tocsr(), points, areas)
 
-    @property
     def weights(self) -> Array:
         """The diagonal of A, (c P,), xy counted twice; of a conservative form only."""
         assert self.areas is not None
