@@ -1,6 +1,6 @@
 """Compare nonlinear solution strategies on equal terms: the users' door.
 
-Every name is loaded when it is first asked for, so that `import nlsolve` costs nothing.
+A name is loaded when it is first used, so that `import nlsolve` is fast.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 try:
     __version__ = version("nlsolve")
-except PackageNotFoundError:  # a checkout on the path, not installed: no plugins either
+except PackageNotFoundError:  # a checkout that is on the path but not installed, which has no plugins
     __version__ = "not installed"
 
 _HOME = {

@@ -1,4 +1,4 @@
-"""The plugin authors' door: every contract and every helper that a plugin may import."""
+"""The plugin authors' door: all contracts and helpers. A plugin imports nothing else of nlsolve."""
 
 from __future__ import annotations
 

@@ -12,7 +12,7 @@ from nlsolve.series import Array
 
 
 class Colouring:
-    """The columns of a pattern in C groups.
+    """The columns of a (U, U) pattern in C groups.
 
     seeds : S, (U, C); S_jc = 1 where column j belongs to group c. Without a pattern each column is a group of its own.
     """
@@ -30,7 +30,7 @@ class Colouring:
         self._columns = groups[entries.coords[1]]
 
     def unpack(self, product: Array) -> Any:
-        """J, sparse (U, U), from J S."""
+        """J, sparse (U, U), from J S, (U, C)."""
         if self._places is None:
             return sp.csr_array(product)
         rows, columns = self._places
@@ -38,7 +38,7 @@ class Colouring:
 
 
 def groups_of(pattern: Any) -> Indices:
-    """A group for each column, (U,), none with two columns in one row: each gets the first group free of neighbours."""
+    """The group of each column, (U,); no two of a group share a row. Each gets the first group without a neighbour."""
     entries = sp.csc_array(pattern, dtype=bool).astype(int)
     neighbours = sp.csr_array(entries.T @ entries)
     groups = np.full(entries.shape[1], -1)

@@ -1,4 +1,4 @@
-"""F(u) = 0 given as one formula: arrays run through it are residuals, seeded series its Jacobian."""
+"""F(u) = 0 given as one formula: run on an array it gives the residual, on a seeded series the Jacobian."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ from nlsolve.contracts.status import InputError, SolveError, Status
 from nlsolve.series import Array, Series
 
 NUMBERS = "iuf"
-"""Kinds of NumPy's types that become real numbers."""
+"""Kinds of NumPy types that are accepted as real numbers."""
 
 LONGEST_VALUE = 60
-"""Characters of a wrong value that are worth repeating."""
+"""Longest wrong value that a sentence repeats, in characters."""
 
 UNFIT = (AttributeError, IndexError, TypeError, ValueError)
 """What Python and NumPy raise when a formula for arrays asks of a series what only an array has."""
@@ -26,12 +26,12 @@ UNFIT = (AttributeError, IndexError, TypeError, ValueError)
 class FormulaProblem(NonlinearProblem):
     """F(u) = 0; the Jacobian is coefficient 1 of the formula run on u with the seeds of a group of columns.
 
-    formula : F, (U,) -> (U,). Where it is not analytic there is no Jacobian but a given one, and no expansion.
+    formula : F, (U,) -> (U,). One that is not analytic has no expansion, and no Jacobian unless `jacobian` is given.
     size : U.
     pattern : where the Jacobian may differ from zero, a (U, U) matrix; None: anywhere.
     jacobian : u -> J(u), dense or sparse (U, U), instead of the one from the formula.
-    columns : F acts on each column of an array (U, C), as that of a `System` does, so that one run of it serves all
-        groups of columns. A formula that knows states (U,) only is run once a group.
+    columns : True when F acts on each column of an array (U, C), as the formula of a `System` does: one run then serves
+        all groups of columns. Otherwise F is run once for each group.
     is_gradient : whether F is the gradient of a convex potential.
 
     Its scale is 1: the published sets are judged by an absolute residual (‖F‖∞ < 1e-6 for the 23 problems), and F alone
@@ -53,21 +53,23 @@ class FormulaProblem(NonlinearProblem):
 
     @property
     def has_series(self) -> bool:
-        """Taken to be so without a given Jacobian, which says that the formula gives none."""
+        """False when a Jacobian is given, which is taken to mean that F does not run on a series."""
         return self._given is None
 
     def residual(self, u: Array) -> Array:
-        """F(u). Raises InputError where that is no (U,) array of real numbers."""
+        """F(u), (U,). Raises InputError when it is no (U,) array of real numbers."""
         return real(self._formula(u), u.shape, "F(u)")
 
     def jacobian(self, u: Array) -> Any:
-        """J(u), sparse (U, U). Raises SolveError (not applicable) where there is none, InputError for a wrong one."""
+        """J(u), sparse (U, U). Raises SolveError (not applicable) when there is none, InputError for a wrong one."""
         if self._given is not None:
             return _matrix(self._given(u), len(u))
         return self._colouring.unpack(self.derivative(u, self._colouring.seeds))
 
     def expand(self, u: Array) -> Expansion:
-        """The formula run on a series that begins with u. Raises SolveError (not applicable) where it cannot be."""
+        """The formula run on a series that begins with u. Raises SolveError (not applicable) when F does not
+        run on one.
+        """
         path = Series(u)
         try:
             return Expansion(path, self._along(path))
@@ -79,7 +81,7 @@ class FormulaProblem(NonlinearProblem):
             ) from error
 
     def derivative(self, u: Array, directions: Array) -> Array:
-        """J(u) S for directions S, (U, C), from the formula. Raises SolveError (not applicable) where it cannot be."""
+        """J(u) S for directions S, both (U, C). Raises SolveError (not applicable) when F does not run on a series."""
         try:
             if self._columns:
                 base = np.broadcast_to(u[:, None], directions.shape)
@@ -94,7 +96,7 @@ class FormulaProblem(NonlinearProblem):
             ) from error
 
     def _along(self, path: Series) -> Series:
-        """F(u(a)); a list or an array of the equations, each a series or a number, is put together."""
+        """F(u(a)) as one series; a list or array of equations, each a series or a number, is stacked."""
         values = self._formula(path)
         if isinstance(values, np.ndarray) and values.dtype == object:
             values = values.tolist()
@@ -119,7 +121,7 @@ def _said(error: Exception) -> str:
 
 
 def real(values: Any, shape: tuple[int, ...], name: str) -> Array:
-    """`values` as an array of real numbers of this shape. Raises InputError that says what `name` is instead."""
+    """`values` as an array of real numbers of this shape. Raises InputError that names `name` when it is not."""
     if type(values) is np.ndarray and values.dtype == np.float64 and values.shape == shape:
         return values
     text = repr(values)

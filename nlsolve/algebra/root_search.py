@@ -1,4 +1,4 @@
-"""F(u) = 0 from its start to a root: the simulation of a system, and whether a root is where it ended."""
+"""F(u) = 0 from one start: the simulation of a system, and the check that its solve has ended at a root."""
 
 from __future__ import annotations
 
@@ -15,18 +15,19 @@ from nlsolve.contracts.scene import Simulation, Solve
 from nlsolve.contracts.status import SolveError, Status
 from nlsolve.series import Array
 
-NEAR = 0.01  # of the size of a root: a state is at the root nearer than this
-POLISHING = 10  # Newton steps that must not lead further away than that from a root nobody has listed
-DENSE = 300  # unknowns up to which these steps are least squares of least norm, which a singular Jacobian allows
+NEAR = 0.01  # relative distance from a root within which a state is at the root
+POLISHING = 10  # Newton steps from an unlisted root, which must not lead further away than that
+DENSE = 300  # unknowns up to which these steps are least-norm least squares, which a singular Jacobian allows
 
 
 class RootSearch(Simulation):
-    """F(u) = 0 from one start, the root found held against the nearest of the known ones.
+    """F(u) = 0 from one `start` (U,); the state that the solve ends at is compared with the nearest known root.
 
+    linear : solves the linear systems of the check, see `verified`.
     nearest_root : u -> the nearest known root, (U,); None where none is known.
     singular : whether the Jacobian is singular at a known root.
 
-    A stopping test met away from all of them is a root that nobody listed, or a doubt, see `verified`.
+    A state that meets the stopping test away from all known roots is an unlisted root or a doubt, see `verified`.
     """
 
     def __init__(
@@ -43,6 +44,7 @@ class RootSearch(Simulation):
         self.sizes = {"unknowns": len(start)}
 
     def solves(self) -> Generator[Solve, Outcome, Outcome]:
+        """Yields the one problem; the status of its outcome tells another root from a known one."""
         outcome = yield Solve(self.problem, self.start)
         error = root_error(self.nearest_root(outcome.state), outcome.state)
         if outcome.status is Status.CONVERGED and not error <= NEAR:
@@ -50,9 +52,11 @@ class RootSearch(Simulation):
         return outcome
 
     def sample(self) -> tuple[NonlinearProblem, Array]:
+        """The problem and its start."""
         return self.problem, self.start
 
     def measured(self, outcome: Outcome) -> Mapping[str, Any]:
+        """Distance from the nearest known root, whether J is singular at a root, and the doubt about the state."""
         return {
             "root_error": root_error(self.nearest_root(outcome.state), outcome.state),
             "root_singular": self.singular,
@@ -61,14 +65,17 @@ class RootSearch(Simulation):
 
 
 def root_error(root: Array | None, u: Array) -> float:
-    """‖u − root‖/‖root‖, ‖u‖ for the root 0; NaN where none is known."""
+    """‖u − root‖/‖root‖ for u and root (U,), ‖u‖ for the root 0; NaN when no root is known."""
     return np.nan if root is None else float(np.linalg.norm(u - root)) / _size(root)
 
 
 def verified(problem: NonlinearProblem, outcome: Outcome, linear: LinearSolver, known: bool) -> tuple[Outcome, str]:
-    """The outcome of a state at which the stopping test is met away from all known roots, and what is in doubt of it.
+    """The outcome of a solve that has met its stopping test away from all known roots, and a doubt about it, or "".
 
-    Another root when Newton's steps stay; elsewhere F may be small without a zero, as it is far out on exp(−x).
+    The state is another root when Newton's steps from it stay near. When they leave it, F may be small without a zero,
+    as exp(−x) is at large x.
+
+    known : whether any root is known; only then the status becomes "other root".
     """
     moved = displacement(problem, outcome.state, linear)
     if moved <= NEAR:
@@ -81,7 +88,7 @@ def verified(problem: NonlinearProblem, outcome: Outcome, linear: LinearSolver, 
 
 
 def displacement(problem: NonlinearProblem, u: Array, linear: LinearSolver) -> float:
-    """‖u_10 − u‖/‖u‖ for ten Newton steps from u, off the clock; infinite when a step fails."""
+    """‖u_10 − u‖/‖u‖ for ten Newton steps from u (U,), which are not timed; infinite when a step fails."""
     state = u
     for _ in range(POLISHING):
         residual, jacobian = problem.residual(state), problem.jacobian(state)

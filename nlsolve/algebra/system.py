@@ -1,8 +1,8 @@
-"""F(u) = 0, u of shape (U,): the contract of scenes that are no flow but a system of equations, given as one formula.
+"""F(u) = 0, u of shape (U,): the contract of scenes that are systems of equations, each given as one formula.
 
-The formula runs on arrays (U, …) and series alike and acts along the first axis, so that the columns of an array are
-as many states at once: seeded columns give the Jacobian, a pushed series the coefficients of the homotopy. No second
-formula is written for either.
+The formula runs on arrays (U, …) and series alike and acts along the first axis, so that each column of an array is a
+state of its own: seeded columns give the Jacobian, a pushed series the coefficients of the homotopy. Neither needs a
+second formula.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from nlsolve.series import Array
 
 
 class System(Scene, ABC):
-    """A formula and the state from which its root is sought; roots and a sparsity pattern where they are known.
+    """A scene given by a formula and a start, with its roots and its sparsity pattern when they are known.
 
     class Circle(System):
         kind: Literal["circle"] = "circle"
@@ -47,7 +47,7 @@ class System(Scene, ABC):
     @abstractmethod
     def formula(self, u: Any) -> Any:
         """F(u), (U, …) -> (U, …), analytic: of +, −, *, /, powers, indexing, slices, matrices from the left, np.stack,
-        np.concatenate, np.sum and np.cumsum along axis 0, exp, log, sin, …; constants (U,) `as_column` beside u.
+        np.concatenate, np.sum and np.cumsum along axis 0, exp, log, sin, …; constants (U,) as `as_column(values, u)`.
         """
 
     @abstractmethod
@@ -55,7 +55,7 @@ class System(Scene, ABC):
         """The state, shape (U,), from which solvers begin."""
 
     def start(self) -> Array:
-        """The standard start, made harder by `factor` (Moré, Garbow & Hillstrom 1981) and `perturbation`."""
+        """The standard start, (U,), made harder by `factor` (Moré, Garbow & Hillstrom 1981) and `perturbation`."""
         standard = np.asarray(self.standard_start(), dtype=float)
         if self.factor != 1.0:
             standard = self.factor * (standard if standard.any() else np.ones_like(standard))
@@ -67,7 +67,7 @@ class System(Scene, ABC):
         return None
 
     def roots(self) -> Array | None:
-        """Known roots, shape (K, U), to a relative 1e-12; None where none is known."""
+        """Known roots, shape (K, U), accurate to a relative 1e-12; None when none is known."""
         return None
 
     @property
@@ -81,20 +81,21 @@ class System(Scene, ABC):
         return False
 
     def nearest_root(self, u: Array) -> Array | None:
-        """The known root, shape (U,), that is nearest to u; None where none is known."""
+        """The known root, shape (U,), that is nearest to u (U,); None when none is known."""
         roots = self.roots()
         return None if roots is None else roots[np.linalg.norm(roots - u, axis=1).argmin()]
 
     def equations(self) -> FormulaProblem:
-        """F with its Jacobian by groups of columns and its expansion."""
+        """The problem F(u) = 0, with its Jacobian by groups of columns and its expansion."""
         size = len(self.standard_start())
         return FormulaProblem(self.formula, size, self.pattern(), columns=True, is_gradient=self.is_gradient)
 
     def search(self, start: Array, linear: LinearSolver, entry: Entry) -> RootSearch:
-        """A search from any start (U,), judged by the roots that are known."""
+        """The simulation from any `start` (U,); `entry` times the building of the problem."""
         with entry("operators"):
             problem = self.equations()
         return RootSearch(problem, start, linear, self.nearest_root, self.singular)
 
     def simulation(self, parts: Any, entry: Entry) -> RootSearch:
+        """The simulation from `start()`."""
         return self.search(self.start(), parts.linear, entry)

@@ -1,4 +1,4 @@
-"""What a plugin promises: one noun a file, from the component that all of them are to rules and problems.
+"""The contracts that plugins implement, one noun a file; those of flows are in `continuum`, those of rules in `rules`.
 
 It may import series.
 """

@@ -11,7 +11,7 @@ class Component(BaseModel):
     """Base of laws, scenes, discretizers, linear solvers, nonlinear solvers and rules.
 
     A plugin's class adds `kind: Literal["its-name"] = "its-name"` and its parameters as fields. Instances are frozen;
-    `with_` gives a validated copy. Unknown fields and non-finite numbers are refused.
+    `with_` gives a validated copy. Raises ValidationError for unknown fields and non-finite numbers.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, validate_default=True)
@@ -19,19 +19,19 @@ class Component(BaseModel):
     noun: ClassVar[str] = "component"
     """What the contract is called in a study file: "law", "scene", …; set by each contract."""
     default_kind: ClassVar[str | None] = None
-    """The kind that a study gets which names none, set by the contract; None: a study must name one."""
+    """The kind used when a study names none, set by each contract; None when a study must name one."""
 
     def with_(self, **changes: Any) -> Self:
-        """A copy with some fields changed, validated like a new one."""
+        """A copy with some fields changed, validated like a new instance. Raises ValidationError for a wrong value."""
         fields = {name: getattr(self, name) for name in type(self).model_fields}
         return type(self).model_validate({**fields, **changes})
 
     absent: ClassVar[str | None] = None
-    """Why the kind cannot be used here, and the way out: "needs the library x: pip install …"; None when it can."""
+    """Why this kind cannot be used here, with the way out: "needs the library x: pip install …"; None when it can."""
 
     @classmethod
     def kind_name(cls) -> str:
-        """The name by which studies ask for this class."""
+        """The name by which studies ask for this class. Raises TypeError when the class declares none."""
         field = cls.model_fields.get("kind")
         if field is None or not isinstance(field.default, str):
             raise TypeError(f'{cls.__name__} must declare its name: kind: Literal["name"] = "name"')

@@ -12,33 +12,33 @@ from nlsolve.series import Array
 
 
 class Factors(ABC):
-    """A factorised matrix."""
+    """A factorised matrix A, with the cost of the factorisation and of the last `solve`."""
 
     ordering: str = "none"
     """Name of the column ordering that was used."""
     fill: int = 0
     """Entries stored in the factors."""
     attempts: int = 1
-    """Factorisations carried out to obtain these factors, trials of orderings included: all are counted."""
+    """Factorisations carried out to obtain these factors, including trials of orderings; all of them are counted."""
     solves: int = 1
-    """Pairs of triangular solves that the last `solve` carried out: one, but for an iteration."""
+    """Pairs of triangular solves that the last `solve` carried out: 1 for a direct solver, more for an iteration."""
     products: int = 0
     """Products with the matrix that the last `solve` carried out."""
 
     @abstractmethod
     def solve(self, rhs: Array) -> Array:
-        """x with A x = rhs: one forward and one backward triangular solve, or as many as `solves` owns up to.
+        """x with A x = rhs, both of shape (U,). Costs as many pairs of triangular solves as `solves` says afterwards.
 
-        Raises SolveError when an iteration does not reach the accuracy it was asked for.
+        Raises SolveError (unsolved tangent) when an iterative solver does not reach its accuracy.
         """
 
     def condition(self) -> float | None:
-        """An estimate of ‖A‖₁ ‖A⁻¹‖₁, asked for off the clock; None when the library gives no transposed solves."""
+        """An estimate of ‖A‖₁ ‖A⁻¹‖₁, which is not timed; None when the library gives no transposed solves."""
         return None
 
 
 class LinearSolver(Component, ABC):
-    """Factorises sparse matrices. Iterative refinement is asked for here and carried out, and counted, outside."""
+    """Factorises sparse matrices. The tangent K* carries out and counts the `refinement` that is declared here."""
 
     noun: ClassVar[str] = "linear"
     default_kind: ClassVar[str | None] = "superlu"
@@ -47,7 +47,9 @@ class LinearSolver(Component, ABC):
 
     @abstractmethod
     def factorize(self, matrix: Any, previous: Factors | None = None) -> Factors:
-        """Factors of a sparse matrix; `previous` ones of a like pattern may lend their ordering or their analysis.
+        """The factors of a sparse (U, U) matrix.
 
-        Raises SolveError: singular tangent, when the matrix is singular to working precision; non-finite.
+        previous : factors of a matrix with a similar pattern, whose ordering or symbolic analysis may be used again.
+        Raises SolveError: singular tangent when the matrix is singular to working precision, non-finite when an entry
+        is not a finite number.
         """

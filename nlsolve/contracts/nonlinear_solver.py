@@ -20,13 +20,13 @@ from nlsolve.series import Array
 
 @dataclass(frozen=True)
 class Step:
-    """One state a method has reached.
+    """One state that a method has reached.
 
     state : (U,) array.
-    claim : True, the method itself holds this state to be the solution (a series whose range reached the end of its
-        path, a library that reports success); False, it says that it failed here; None, it says nothing.
-    notes : what the method wants recorded in the `steps` table, e.g. {"range": 1.7, "limited_by": "ratio"}. A name that
-        is no column of `nlsolve.results.columns.STEPS` is recorded as a column "note.<name>".
+    claim : True when the method reports this state as the solution (a series whose range reached the end of its path,
+        a library that reports success); False when it reports that it failed here; None when it reports neither.
+    notes : values for the step's row of `steps`, such as {"range": 1.7, "limited_by": "ratio"}. A name that is no
+        column of `nlsolve.results.columns.STEPS` is recorded as a column "note.<name>".
     """
 
     state: Array
@@ -35,32 +35,36 @@ class Step:
 
 
 class KeptTangent(ABC):
-    """K*, a factorised matrix that a method works with until the refresh rule asks for a new one."""
+    """The tangent K*: a factorised matrix that a method solves with until the refresh rule asks for a new one."""
 
     @abstractmethod
     def refresh_if_due(self, assemble: Callable[[], Any]) -> bool:
-        """Factorise the matrix that `assemble` returns when there is no K* yet or the refresh rule says so.
+        """Factorise the matrix that `assemble` returns when there is no K* yet or the refresh rule asks for one.
 
-        assemble : called only then; a Jacobian of the problem, anything computed from it, or any sparse matrix.
+        assemble : called only then. Returns a Jacobian of the problem, a matrix computed from it, or any other sparse
+            (U, U) matrix.
         Returns True when K* was renewed. Raises SolveError when the matrix cannot be factorised.
         """
 
     @abstractmethod
     def solve(self, rhs: Array) -> Array:
-        """K*⁻¹ rhs. Raises SolveError when the right-hand side or the answer is not finite."""
+        """K*⁻¹ rhs, shape (U,).
+
+        Raises SolveError when the right-hand side or the answer is not finite, TypeError when there is no K* yet.
+        """
 
     @abstractmethod
     def observe(self, *, contraction: float | None = None, range: float | None = None) -> None:
-        """Tell the refresh rule more about the last step than the driver can see.
+        """Tell the refresh rule what the driver cannot measure of the last step.
 
-        contraction : ‖R_new‖/‖R_old‖ per solve, of a method that takes several solves in a step, or of a step that was
-            refused. Without it the refresh rule is told ‖R_new‖/‖R_old‖ of the step as the driver measures it.
-        range : a_max of a series.
+        contraction : ‖R_new‖/‖R_old‖ per solve, from a method that needs several solves for a step or that has refused
+            a step. When a method reports none, the refresh rule gets ‖R_new‖/‖R_old‖ as the driver measures it.
+        range : a_max of the step's series.
         """
 
 
 class NonlinearSolver(Component, ABC):
-    """A strategy for R(u) = 0. It holds no counter, clock, print or stopping tolerance but its own mathematics."""
+    """A strategy for R(u) = 0. It holds its own mathematics, and no counter, clock, print or stopping tolerance."""
 
     noun: ClassVar[str] = "solver"
     default_refresh: ClassVar[Mapping[str, Any]] = {"kind": "every-iteration"}
@@ -70,8 +74,12 @@ class NonlinearSolver(Component, ABC):
 
     @abstractmethod
     def steps(self, problem: NonlinearProblem, tangent: KeptTangent, start: Array) -> Iterator[Step]:
-        """States from `start` on, the start itself first, without end: the driver stops asking.
+        """Yields states without end, `start` (U,) itself first; the driver decides when to stop.
 
-        problem : its residuals, Jacobians, products and series are counted and timed as they are asked for. A Jacobian
-            can be read and combined like any sparse matrix; what the method computes from it shows in `seconds_own`.
+        A method that returns by itself ends as "stagnated", one that raises SolveError with the status of that error.
+
+        problem : counts and times its residuals, Jacobians, products and series when the method asks for them. A
+            Jacobian can be read and combined like any sparse matrix; what the method computes from it shows in
+            `seconds_own`.
+        tangent : K*, through which the method factorises and solves linear systems.
         """

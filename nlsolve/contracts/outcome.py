@@ -12,21 +12,25 @@ from nlsolve.contracts.status import Status
 from nlsolve.series import Array
 
 SHOWN = 6
-"""Entries of a longer state that are printed, from both ends."""
+"""Number of entries that are printed of a longer state, half of them from each end."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Outcome:
-    """How one solve ended: its status, the last state, the residual that counts, the work it took, and its steps.
+    """How one solve ended: its status, its last state and residual, its work, and its steps.
 
-    status, detail : the ending, and what is to be said of this one; the sentence of the status where that is all.
-    state : u, (U,), the last one that the method reached.
-    residual_norm : ‖R(u)‖₂ over the problem's scale, asked for outside the method.
-    rows : a dictionary a step, in order; `steps` is the same as a frame.
-    claimed_wrongly, denied_wrongly : the method said converged of a state that is no solution, failed of one that is.
-    blame : of a solve that failed, where the last residual is largest (`NonlinearProblem.blame`).
-    counts : how often each kind of work was done in this solve, by the names of the columns of `runs`.
-    seconds : the time each kind of work took, "own" for what the method did by itself; their sum is all of it.
+    status : the kind of ending.
+    detail : a sentence on this ending; the sentence of the status when there is no more to say.
+    state : u, shape (U,), the last state that the method reached.
+    residual_norm : ‖R(u)‖₂ over the problem's scale, which the driver computes.
+    rows : one dictionary for each step, in order; `steps` gives them as a frame.
+    claimed_wrongly : True when the method, or a stopping test other than that of residuals, accepted a state whose
+        residual is not small.
+    denied_wrongly : True when the method reported failure at a state whose residual is small.
+    blame : where the last residual is largest (`NonlinearProblem.blame`); empty after convergence.
+    counts : how often each kind of work was done in this solve, by columns of `runs`.
+    seconds : the time [s] that each kind of work took, "own" for the method's own arithmetic; their sum is the time
+        spent in the method.
     """
 
     status: Status
@@ -42,7 +46,7 @@ class Outcome:
 
     @property
     def converged(self) -> bool:
-        """Whether the stopping test was met, at whichever root."""
+        """Whether the stopping test was met, at a known root or at another one."""
         return self.status in (Status.CONVERGED, Status.OTHER_ROOT)
 
     @property
@@ -53,12 +57,12 @@ class Outcome:
 
     @property
     def iterations(self) -> int:
-        """Steps taken from the start."""
+        """Number of steps after the start."""
         return max(0, len(self.rows) - 1)
 
     @property
     def steps(self) -> pd.DataFrame:
-        """A row a state, the start first, with the columns of `steps` that apply."""
+        """One row for each state, the start first, with the columns of `steps` that apply to the method."""
         return pd.DataFrame(list(self.rows))
 
     def __repr__(self) -> str:
@@ -80,12 +84,12 @@ def _words(name: str) -> str:
 
 
 def _counted(number: int, name: str) -> str:
-    """1 residual, 2 residuals"""
+    """A number with its noun: 1 residual, 2 residuals."""
     return f"{number} {_words(name.removesuffix('s') if number == 1 else name)}"
 
 
 def _entries(state: Array) -> str:
-    """A short state, or both ends of a long one."""
+    """The entries of a short state, or those at both ends of a long one."""
     shown = [f"{value:.4g}" for value in state]
     if len(shown) > SHOWN:
         shown = [*shown[: SHOWN // 2], "…", *shown[-SHOWN // 2 :]]

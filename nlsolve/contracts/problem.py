@@ -22,7 +22,7 @@ class Expansion:
         self._path, self._residual = path, residual
 
     def coefficient(self, j: int) -> Array:
-        """R_j, which needs u_0 … u_j."""
+        """R_j, shape (U,), which needs u_0 … u_j. Raises IndexError while one of these has not been appended."""
         return self._residual.coefficient(j)
 
     def remainder(self, j: int) -> Array:
@@ -33,19 +33,20 @@ class Expansion:
         return remainder
 
     def append(self, coefficient: Array) -> None:
-        """Push u_j, the next coefficient of the path."""
+        """Push u_j, shape (U,), the next coefficient of the path."""
         self._path.append(coefficient)
 
     def path(self, a: float) -> Array:
-        """u(a), summed over the coefficients appended so far."""
+        """u(a), shape (U,), summed over the coefficients appended so far."""
         return self._path.sum(a)
 
 
 class NonlinearProblem(ABC):
     """R(u) = 0 for u of shape (U,).
 
-    `residual` is all that a problem must have. Methods that factorise or multiply need `jacobian`, those that work with
-    Taylor series `expand`, Picard's iteration `secant`; on a problem without them they end as "not applicable".
+    A problem must define `residual` only. Methods that factorise or multiply need `jacobian`, methods that use Taylor
+    series need `expand`, and Picard's iteration needs `secant`. A method ends as "not applicable" on a problem that
+    does not define what it needs.
     """
 
     is_gradient: bool = False
@@ -53,7 +54,7 @@ class NonlinearProblem(ABC):
 
     @property
     def has_series(self) -> bool:
-        """True when the problem gives an expansion of R, as it does once its class defines `expand`."""
+        """True when the problem can expand R; by default, when its class defines `expand`."""
         return type(self).expand is not NonlinearProblem.expand
 
     @abstractmethod
@@ -61,7 +62,7 @@ class NonlinearProblem(ABC):
         """R(u), shape (U,)."""
 
     def jacobian(self, u: Array) -> Any:
-        """J = ∂R/∂u, a sparse (U, U) matrix. SolveError (not applicable) from a problem without one."""
+        """J = ∂R/∂u, a sparse (U, U) matrix. Raises SolveError (not applicable) when the problem has none."""
         raise SolveError(
             Status.NOT_APPLICABLE,
             f"{type(self).__name__} has no Jacobian: define its method `jacobian`, or choose a method that needs its "
@@ -69,7 +70,7 @@ class NonlinearProblem(ABC):
         )
 
     def expand(self, u: Array) -> Expansion:
-        """The expansion of R around u. SolveError (not applicable) from a problem without one."""
+        """The expansion of R around u. Raises SolveError (not applicable) when the problem has none."""
         raise SolveError(
             Status.NOT_APPLICABLE,
             f"{type(self).__name__} has no Taylor series of its residual: write the residual as one formula and run it "
@@ -77,9 +78,10 @@ class NonlinearProblem(ABC):
         )
 
     def secant(self, u: Array) -> Any:
-        """A(u) with R(u) = A(u) u + c(u), a sparse (U, U) matrix, of a problem that is linear but for its coefficients.
+        """A(u) with R(u) = A(u) u + c(u), a sparse (U, U) matrix: Picard's matrix.
 
-        These stay out of A's own derivative: Picard's matrix. SolveError (not applicable) from a problem without one.
+        It belongs to a problem that is linear once its coefficients are held; their derivatives are left out of A.
+        Raises SolveError (not applicable) when the problem has none.
         """
         raise SolveError(
             Status.NOT_APPLICABLE,
@@ -88,9 +90,9 @@ class NonlinearProblem(ABC):
         )
 
     def blame(self, u: Array, residual: Array) -> Mapping[str, float]:
-        """Where R(u) = `residual` is largest, and what is special there: columns `blame_…` of a failed solve."""
+        """Where R(u) = `residual` (U,) is largest, and what is special there: columns `blame_…` of a failed solve."""
         return {"blame_unknown": int(np.nan_to_num(np.abs(residual), nan=np.inf).argmax())}
 
     def scale(self, u: Array) -> float:
-        """What ‖R‖₂ is compared with to call it small; 1 unless the problem knows the size of what cancels in R."""
+        """The size that ‖R(u)‖₂ is divided by to judge it; 1 unless the problem knows the size of what cancels in R."""
         return 1.0

@@ -1,11 +1,11 @@
-"""What a study's [scene] is: a component that builds the simulation of a case. The contract of scenes and simulations.
+"""A scene is the component that builds the simulation of a case. The contract of scenes and simulations.
 
-    outcome = None
-    for each problem that the simulation yields:        Solve(R, u_0)
-        outcome = driver.solve(R, method, K*, u_0)       and back to the simulation
+    for each Solve(R, u_0) that the simulation yields:
+        outcome = driver.solve(R, method, K*, u_0)
+        send the outcome to the simulation
 
-A simulation knows its physics and nothing of methods, counters or clocks; a flow, a system of equations and a
-stranger's partial differential equation are three of them, and nothing after the case knows which.
+A simulation knows its physics, but no method, counter or clock. A flow, a system of equations and a stranger's partial
+differential equation are three kinds of simulation; nothing after the case knows which of them it has.
 """
 
 from __future__ import annotations
@@ -27,14 +27,19 @@ from nlsolve.series import Array
 
 
 class Entry(Protocol):
-    """`with entry("operators"): …` counts and times work of one kind in the books of the case."""
+    """`with entry("operators"): …` counts and times work of one kind in the ledger of the case."""
 
     def __call__(self, kind: str) -> AbstractContextManager[None]: ...
 
 
 @dataclass(frozen=True)
 class Preparation:
-    """A solve on the way to the first state: by its own method, with a new tangent each iteration, counted apart."""
+    """How a problem on the way to the first state is solved; the work is counted apart from that of the case's method.
+
+    solver : the method, which gets a new tangent K* at each iteration.
+    tolerance : largest relative residual accepted.
+    iterations : steps allowed.
+    """
 
     solver: NonlinearSolver
     tolerance: float
@@ -43,11 +48,12 @@ class Preparation:
 
 @dataclass(frozen=True)
 class Solve:
-    """One problem for the driver.
+    """One problem that a simulation hands to the driver.
 
     start : u_0, shape (U,).
-    increment, time : number of the time step, 0 for a steady state, and the time at its end [s].
-    preparation : set on the way to the first state; None: the method of the case solves this.
+    increment : number of the increment; 0 for a steady or first state.
+    time : time at the end of the increment [s].
+    preparation : how a problem on the way to the first state is solved; None when the method of the case solves it.
     """
 
     problem: NonlinearProblem
@@ -59,7 +65,12 @@ class Solve:
 
 @dataclass(frozen=True)
 class Workload:
-    """What a forecast reckons with: increments, discretisations built, and solves on the way to the first state."""
+    """The amount of work from which a forecast computes the seconds of a case.
+
+    increments : solves by the method of the case.
+    discretizations : how often operators are built.
+    stages : solves on the way to the first state.
+    """
 
     increments: int = 1
     discretizations: int = 0
@@ -69,9 +80,9 @@ class Workload:
 class Simulation(ABC):
     """The problems of one case, in order, and what is measured on the states that solve them.
 
-    increments : time steps wanted; 0 for a steady state.
+    increments : number of increments (time steps); 0 for a steady state.
     prepares : whether there are solves on the way to the first state.
-    sizes : columns of `runs` for the size of the case, such as `unknowns`, as far as it is known by now.
+    sizes : columns of `runs` for the size of the case, such as `unknowns`; None for a size that is not known yet.
     """
 
     increments: int = 0
@@ -80,18 +91,21 @@ class Simulation(ABC):
 
     @abstractmethod
     def solves(self) -> Generator[Solve, Outcome, Outcome]:
-        """Yields problems, is sent how each ended, and returns how the case ended. May raise SolveError."""
+        """Yields problems, is sent the outcome of each, and returns the outcome of the case. May raise SolveError."""
 
     @abstractmethod
     def sample(self) -> tuple[NonlinearProblem, Array]:
-        """A problem of the case and a state for it, to time work on; nothing is iterated. May raise SolveError."""
+        """A problem of the case and a state (U,) for it, on which the cost of work is timed. Nothing is iterated.
+
+        May raise SolveError.
+        """
 
     def keep(self, solve: Solve, state: Array) -> Mapping[str, float]:
-        """A state (U,) that solves the problem; returns columns of `steps` for the step that reached it."""
+        """Keeps a state (U,) that solves its problem; returns columns of `steps` for the step that reached it."""
         return {}
 
     def measured(self, outcome: Outcome) -> Mapping[str, Any]:
-        """Columns of `runs` besides `sizes`, for the last state kept, whatever the ending of the case."""
+        """Columns of `runs` besides `sizes`, measured on the last state kept; also called when the case has failed."""
         return {}
 
     def fields(self) -> pd.DataFrame:
@@ -99,20 +113,23 @@ class Simulation(ABC):
         return pd.DataFrame()
 
     def place(self, blame: Mapping[str, float]) -> str:
-        """Where the residual is largest, in words, from the columns `blame_…`; empty where they say it."""
+        """Words for the place that the columns `blame_…` give; empty when the columns say enough."""
         return ""
 
     def workload(self) -> Workload:
-        """Told before anything is solved."""
+        """The amount of work that the case will take; called before anything is solved."""
         return Workload()
 
     def diagnostics(self) -> list[dict[str, Any]]:
-        """How good the discretisation is, a row an operator (columns `DIAGNOSTICS`); empty: there is none to judge."""
+        """One row for each operator on the quality of the discretisation (columns `DIAGNOSTICS`); empty without one."""
         return []
 
 
 class SingleSolve(Simulation):
-    """R(u) = 0 from one start, with columns of `runs` measured on the solution u (U,)."""
+    """The simulation of one problem: R(u) = 0 from `start` (U,).
+
+    measure : u -> columns of `runs`, called with the last state u (U,).
+    """
 
     def __init__(
         self,
@@ -124,22 +141,26 @@ class SingleSolve(Simulation):
         self.sizes = {"unknowns": len(start)}
 
     def solves(self) -> Generator[Solve, Outcome, Outcome]:
+        """Yields the one problem; its outcome is that of the case."""
         return (yield Solve(self.problem, self.start))
 
     def sample(self) -> tuple[NonlinearProblem, Array]:
+        """The problem and its start."""
         return self.problem, self.start
 
     def measured(self, outcome: Outcome) -> Mapping[str, Any]:
+        """The columns that `measure` gives for the state of the outcome."""
         return self.measure(outcome.state)
 
 
 @dataclass(frozen=True)
 class Section:
-    """A section of a study file that a scene asks for.
+    """A section of a study file that a scene needs.
 
-    contract : what is written there; of a contract with kinds, any installed kind.
-    default : the table that a section without a kind is completed with; None: the contract's own default kind.
-    of : another section, whose class names the default of this one as `default_SECTION`; None there: no such component.
+    contract : the class of its component. When the contract has kinds, a study chooses any installed one.
+    default : the table that completes a section without a kind; None: the default kind of the contract.
+    of : name of another section. The class of its component gives the default of this section in its attribute
+        `default_SECTION`; None there leaves this section without a component.
     """
 
     contract: type[Component]
@@ -148,14 +169,14 @@ class Section:
 
     @property
     def default_table(self) -> Mapping[str, Any] | None:
-        """What is written there by default: `default`, else the contract's own default kind."""
+        """`default`, or else a table with the default kind of the contract; None when a study must name a kind."""
         if self.default is None and self.contract.default_kind is not None:
             return {"kind": self.contract.default_kind}
         return self.default
 
 
 class Misfit(ValueError):
-    """Sections of a case that do not fit together: the section and field to change, and what was expected there."""
+    """Components of a case do not fit together. Names the section and field to change, and what is expected there."""
 
     def __init__(self, section: str, field: str, expected: str) -> None:
         super().__init__(f"{section}.{field}: {expected}")
@@ -163,8 +184,8 @@ class Misfit(ValueError):
 
 
 class Scene(Component, ABC):
-    """What is simulated. Its class declares the sections it needs beside `scene` and those of every case (linear,
-    solver, refresh, stop, budget); a declared name of those replaces their default.
+    """What is simulated. Its class declares in `sections` what it needs beside `scene` and the sections of every case
+    (linear, solver, refresh, stop, budget); a declaration under one of these names replaces the default.
 
     class Heat(Scene):
         kind: Literal["heat"] = "heat"
@@ -181,7 +202,11 @@ class Scene(Component, ABC):
 
     @abstractmethod
     def simulation(self, parts: Any, entry: Entry) -> Simulation:
-        """The simulation of a case. `parts` has the component of each section under its name."""
+        """The simulation of a case.
+
+        parts : has the component of each section as an attribute of that name.
+        entry : times work outside the method, such as building operators, in the ledger of the case.
+        """
 
     def check(self, parts: Any) -> None:
-        """Raises Misfit where components that are valid each for itself do not fit together."""
+        """Raises Misfit when components, each valid by itself, do not fit together."""

@@ -1,4 +1,4 @@
-"""How a solve ended. Every ending is a value, and its sentence is what a reader of the table is told."""
+"""How a solve ended. Each ending is a value with a sentence for the reader of a table."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from enum import Enum
 
 
 class Status(Enum):
-    """The ending of one solve, of one march, or of one case."""
+    """The ending of one solve or of one case."""
 
     CONVERGED = "the stopping test was met"
     OTHER_ROOT = "the stopping test was met at a root other than the known ones"
@@ -47,7 +47,11 @@ class InputError(ValueError):
 
 
 class SolveError(Exception):
-    """An ending discovered deep inside a computation; the driver turns it into a status, never the user's traceback."""
+    """A computation cannot go on. The driver turns this error into the status of the outcome; a user sees no traceback.
+
+    status : the kind of ending.
+    detail : a sentence on this ending; empty when the sentence of the status is enough.
+    """
 
     def __init__(self, status: Status, detail: str = "") -> None:
         super().__init__(detail or status.sentence)

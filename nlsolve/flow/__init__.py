@@ -1,4 +1,4 @@
-"""R(v) = 0, the balance of momentum: from the first state on, increment after increment, to what is measured on it.
+"""R(v) = 0, the balance of momentum: its first state, its increments, and what is measured on the states that solve it.
 
 It may import series, contracts, registry, results and solving.
 """

@@ -1,4 +1,4 @@
-"""From rest, where no series and no Newton step has a useful range, to the first state: continuation."""
+"""Continuation from rest, where no series and no Newton step has a useful range, to the first state."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ from nlsolve.registry.nested import AnySolver
 from nlsolve.series import Array
 
 LOAD = "load"
-"""What is varied when it is no field of the law: the part of boundary velocities and body forces that acts."""
+"""The value of `by` that is no field of the law: it varies a factor on boundary velocities and body forces."""
 
-EASY = 8  # iterations up to which a stage was easy, and the next step is twice as long
+EASY = 8  # a stage solved in so many iterations or fewer was easy: the next step is doubled
 
 
 @dataclass(frozen=True)
 class Stage:
-    """One problem on the way: its law, the part of the load that acts, and the value of what is varied."""
+    """One problem of the continuation: its law, the factor on its load, and the value of what is varied."""
 
     law: ConstitutiveLaw
     load: float
@@ -34,16 +34,17 @@ class Stage:
 
 
 class Start(Component):
-    """The first state is solved with `by` at each of `values` that is easier than the target, then at the target.
+    """How the first state is reached: a stage is solved for each of `values` that is easier than the target, in order,
+    and then the target itself. These are values of `by`, a field by which the law is continued, or "load", which is
+    easier when it is smaller.
 
-    `by` is one of the fields by which the law is continued, or "load" (a smaller one is easier). The method `solver`
-    solves the stages, with a new tangent each iteration; its work is counted apart from the march (columns `start_…`).
-    An adaptive continuation begins with the first of `values`, tries the second next, and goes on in steps of
-    log(`by`), halved where a stage fails and doubled where it was easy. With no values, the case's own method solves a
-    steady scene from rest.
+    The method `solver` solves the stages, with a new tangent each iteration; its work is counted apart from the march
+    (columns `start_…`). An adaptive continuation begins with the first of `values`, tries the second next, and goes on
+    in steps of log(`by`), which are halved when a stage fails and doubled when it was easy. With no values, the method
+    of the case solves a steady scene from rest.
 
-    A perturbation moves the guess that each solve of the case's own method begins with: in a steady scene the state
-    after the continuation (or rest), in a march the state that each increment begins with. Equations stay the same.
+    A perturbation moves the guess that each solve by the method of the case begins with: in a steady scene the state
+    after the continuation (or rest), in a march the state that each increment begins with. The equations stay the same.
     """
 
     noun: ClassVar[str] = "start"
@@ -78,7 +79,7 @@ class Start(Component):
         return u + self.perturbation * np.linalg.norm(flow.velocity(u)) / np.linalg.norm(g) * g
 
     def stages(self, law: ConstitutiveLaw) -> list[Stage]:
-        """The stages that `values` name, and the target last. ValueError for what cannot be gone through."""
+        """The stages of `values`, in order, and the target last. Raises ValueError when the law refuses the values."""
         if self.by == LOAD:
             path = (*self.values, 1.0)
             if min(path) <= 0.0 or (np.diff(path) <= 0.0).any():
@@ -113,15 +114,16 @@ class Start(Component):
 
 
 Solves = Generator[Solve, Outcome, Outcome]
-"""Problems yielded to the driver, the outcome of each sent back, and the outcome of the last returned."""
+"""A generator that yields problems, is sent the outcome of each, and returns the outcome of the last."""
 
 
 def walk(
     start: Start, law: ConstitutiveLaw, solve: Callable[[Stage, bool], Solves]
 ) -> Generator[Solve, Outcome, tuple[Outcome, Stage]]:
-    """Solve stage after stage, each from the state the last one left; the outcome of the last, and which that was.
+    """Solve stage after stage, each from the state of the one before, until one fails or the target is solved.
 
-    solve(stage, last) yields the problems of a stage; the state of one that converges is where the next begins.
+    solve : (stage, last) -> the problems of a stage; `last` is True for the target.
+    Returns the outcome of the last stage, and that stage. Raises ValueError as `Start.stages` does.
     """
     stages = start.stages(law)
     if start.adaptive and len(stages) > 1:
@@ -136,7 +138,7 @@ def walk(
 def _adaptive(
     start: Start, stages: list[Stage], solve: Callable[[Stage, bool], Solves]
 ) -> Generator[Solve, Outcome, tuple[Outcome, Stage]]:
-    """Along log(by), `step` being a part of the whole way."""
+    """`walk` by steps in log(by); `step` is a part of the whole way."""
     first, second, target = stages[0], stages[1], stages[-1]
     step = float(np.log(second.value / first.value) / np.log(target.value / first.value))
     reached, here = 0.0, first

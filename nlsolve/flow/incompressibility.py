@@ -18,16 +18,20 @@ from nlsolve.flow.observables import divergence
 from nlsolve.flow.state import FlowState
 from nlsolve.solving.anderson_mixing import Mixing
 
-DEPTH = 8  # changes mixed
+DEPTH = 8  # changes of the pressure that are mixed
 
 
 def pressure_mixing() -> Mixing:
-    """Of one increment: undamped, over the last `DEPTH` changes."""
+    """The mixing for one increment: undamped, over the last `DEPTH` changes."""
     return Mixing(DEPTH, 1.0)
 
 
 def iterate_pressure(state: FlowState, solve_once: Callable[[], Solves]) -> Solves:
-    """Solve, and iterate the pressure until ‖div v‖ ≤ divergence_tolerance · ‖ε̄‖ where the physics ask for that."""
+    """Solve, and iterate the pressure until ‖div v‖ ≤ divergence_tolerance · ‖ε̄‖ when the physics set this tolerance.
+
+    solve_once : yields the problem with the present pressure.
+    Returns the outcome of the last solve; "budget spent" when the iterations of the pressure do not suffice.
+    """
     physics, mixing = state.parts.physics, pressure_mixing()
     asked, most = physics.divergence_tolerance, physics.pressure_iterations
     outcome = yield from solve_once()

@@ -1,4 +1,4 @@
-"""First state, then increment after increment: the simulation of a flow."""
+"""The simulation of a flow: its first state, then increment after increment."""
 
 from __future__ import annotations
 
@@ -43,6 +43,7 @@ class FlowSimulation(Simulation):
         self.probe: int | None = None
 
     def solves(self) -> Solves:
+        """Yields the problems of the first state and of each increment, until one fails. May raise SolveError."""
         self.begin()
         outcome = yield from self.first_state()
         for k in range(1, self.increments + 1):
@@ -52,6 +53,7 @@ class FlowSimulation(Simulation):
         return outcome
 
     def keep(self, solve: Solve, state: Array) -> Mapping[str, float]:
+        """Keep a solved state (2F,); returns place and velocity of the probe, when there is one."""
         assert isinstance(solve.problem, Flow)
         self.state.keep(solve.problem, state)
         if solve.preparation is not None:
@@ -65,7 +67,7 @@ class FlowSimulation(Simulation):
     # The parts of a march.
 
     def begin(self) -> None:
-        """The cloud at t = 0, the balance on it, and the node that is watched."""
+        """Build the cloud at t = 0 and its operators, and find the node of the probe. May raise SolveError."""
         self.initial = cloud = self.parts.scene.cloud(self.parts.law)
         self.sizes = {
             "nodes": len(cloud.nodes),
@@ -78,7 +80,7 @@ class FlowSimulation(Simulation):
             self.probe = int(inside[np.linalg.norm(cloud.nodes[inside] - probe, axis=1).argmin()])
 
     def first_state(self) -> Solves:
-        """Quasi-static state at t = 0 by continuation; a steady flow's last stage is the case's own."""
+        """Solve the quasi-static problem at t = 0 by continuation; the method of the case solves a steady target."""
         parts, state = self.parts, self.state
 
         def solve_stage(stage: Stage, last: bool) -> Solves:
@@ -101,13 +103,13 @@ class FlowSimulation(Simulation):
         return outcome
 
     def prepare(self, stage: Stage) -> Solves:
-        """One stage on the way to the first state."""
+        """Yields the problem of one stage on the way to the first state."""
         flow = self.state.flow_of(stage.law, load=stage.load)
         preparation = self.parts.start.preparation(self.parts.budget.iterations)
         return (yield Solve(flow, flow.unknowns(self.state.guess), preparation=preparation))
 
     def advance(self, k: int) -> Solves:
-        """One time step: move the nodes if they move, then solve the balance at its end."""
+        """Solve increment k: move the nodes if they move, then yield the problem at its end. May raise SolveError."""
         state, predictor = self.state, self.parts.predictor
         carry = state.move_to(k * self.parts.time.increment, self.before)
         if carry is not None:
@@ -125,14 +127,14 @@ class FlowSimulation(Simulation):
         return outcome
 
     def increment(self, k: int, flow: Flow) -> Solves:
-        """The balance at the end of one increment, for the method of the case."""
+        """Yields the problem of increment k for the method of the case, with its first guess."""
         guess = self.parts.start.disturbed(flow, flow.unknowns(self.state.guess), k)
         return (yield Solve(flow, guess, k, self.state.time))
 
-    # What is left behind.
+    # What is recorded and measured.
 
     def record_fields_if_due(self) -> None:
-        """Keep the fields when this time, to half an increment, is one of those asked for, or the last."""
+        """Record the fields when the time is within half an increment of a recorded time or of the horizon."""
         parts, now = self.parts, self.state
         asked = (*parts.record.times, parts.time.horizon or 0.0)
         if any(abs(now.time - moment) < 0.5 * parts.time.increment for moment in asked):
@@ -142,6 +144,7 @@ class FlowSimulation(Simulation):
             self.snapshots.append(fields.assign(marker_x=places[:, 0], marker_y=places[:, 1]))
 
     def fields(self) -> pd.DataFrame:
+        """One row for each node and recorded time (columns of `FIELDS`)."""
         return pd.concat(self.snapshots, ignore_index=True) if self.snapshots else pd.DataFrame()
 
     def measured(self, outcome: Outcome) -> Mapping[str, Any]:
@@ -168,16 +171,19 @@ class FlowSimulation(Simulation):
         return found | audit(parts, flow, velocity, change, time, estimate)
 
     def place(self, blame: Mapping[str, float]) -> str:
+        """The place of the largest residual and the strain rate there, in words."""
         if "blame_x" not in blame:
             return ""
         x, y, rate = (blame[f"blame_{name}"] for name in ("x", "y", "rate"))
         return f"the residual is largest at ({x:.3g}, {y:.3g}), where ε̄ = {rate:.2g} 1/s"
 
-    # What is told before anything is solved.
+    # What is known before anything is solved.
 
     def sample(self) -> tuple[NonlinearProblem, Array]:
-        """The balance at t = 0, and the state one Newton step away from rest under the easiest law of the way to the
-        first state: where that law is Newtonian, the flow of a Newtonian material.
+        """The problem at t = 0, and the state (2F,) that one Newton step from rest reaches in the first stage of the
+        continuation. When the law of that stage is Newtonian, the state is a Newtonian flow.
+
+        May raise SolveError.
         """
         parts, state = self.parts, self.state
         self.begin()
@@ -190,11 +196,13 @@ class FlowSimulation(Simulation):
         return state.flow_of(parts.law), u
 
     def workload(self) -> Workload:
+        """Increments, clouds that are discretised, and stages of the continuation."""
         increments = max(1, self.increments)
         clouds = 1 + (increments if self.parts.motion.moving else 0)
         return Workload(increments, clouds, len(self.parts.start.stages(self.parts.law)))
 
     def diagnostics(self) -> list[dict[str, Any]]:
+        """One row for each operator of the cloud at t = 0 on its quality, or one with the reason why there is none."""
         cloud = self.parts.scene.cloud(self.parts.law)
         try:
             found = self.parts.discretizer.diagnostics(cloud) or [{"operator": "this discretizer gives no diagnostics"}]

@@ -95,11 +95,11 @@ class Flow(NonlinearProblem):
         self._constant = constant
 
     def residual(self, u: Array) -> Array:
-        """R(u)."""
+        """R(u), (2F,)."""
         return self._balance(u)
 
     def expand(self, u: Array) -> Expansion:
-        """The same balance, run on a series that begins with u."""
+        """The expansion of R around u: the formula of the residual, run on a series that begins with u."""
         path = Series(u)
         return Expansion(path, self._balance(path))
 
@@ -159,7 +159,7 @@ class Flow(NonlinearProblem):
 
     def blame(self, u: Array, residual: Array) -> Mapping[str, float]:
         """The node where ‖R‖ is largest, the strain rate at the strain point nearest to it, and the share of the strain
-        points where ε̄ < ε₀, whose viscosity is the regularization's own.
+        points where ε̄ < ε₀, where the regularization sets the viscosity.
         """
         forces = np.nan_to_num(np.linalg.norm(residual.reshape(-1, 2), axis=1), nan=np.inf)
         node = int(self.cloud.interior[forces.argmax()])
@@ -180,7 +180,7 @@ class Flow(NonlinearProblem):
         return full.reshape(-1, 2)
 
     def unknowns(self, velocity: Array) -> Array:
-        """u from the velocities (N, 2) of all nodes."""
+        """u, shape (2F,), from the velocities (N, 2) of all nodes."""
         return velocity[self.cloud.interior].ravel()
 
     def stress_at_points(self, u: Array) -> Array:
@@ -230,7 +230,7 @@ class _Carried:
 
 
 def secant_moduli(law: ConstitutiveLaw, strain_rate: Array) -> Array:
-    """C = 2 μ I, shape (3, 3, M), so that s = C ε̇."""
+    """C = 2 μ I [MPa s], shape (3, 3, M), so that s = C ε̇, for strain rates (3, M) ordered xx, yy, xy."""
     return 2.0 * np.eye(3)[:, :, None] * law.viscosity(rate_squared(strain_rate))
 
 

@@ -1,6 +1,6 @@
-"""dx/dt = V(x, t) : where the nodes go, and where the material goes when they stay or go elsewhere.
+"""dx/dt = V(x, t) : the motion of nodes with the material, and that of markers when nodes stay or are shifted.
 
-N nodes. Boundary nodes and markers follow the exact motion of their wall; everything else is integrated.
+N nodes. Boundary nodes and markers follow the exact motion of their wall; all others are integrated.
 """
 
 from __future__ import annotations
@@ -19,10 +19,10 @@ from nlsolve.contracts.status import SolveError, Status
 from nlsolve.series import Array
 
 LEAST_QUALITY = 0.05
-"""Distance to the nearest node, over that at t = 0, below which a moving cloud is given up."""
+"""Smallest distance to the nearest node, over that at t = 0, with which a moving cloud goes on."""
 
 LARGEST_SHIFT = 0.1
-"""A node is shifted by no more than this part of its own spacing in one increment."""
+"""Largest shift of a node in one increment, over its own spacing."""
 
 NEIGHBOURS = 8
 
@@ -35,7 +35,7 @@ HALFWAY: dict[int, tuple[float, ...]] = {
 """Weights of V at t + Δt, t, t − Δt, t − 2Δt in the polynomial through them, at t + Δt/2."""
 
 LOST = 1.5
-"""A marker farther than this many spacings from every node, or outside the rectangle around all, has left them."""
+"""A marker that is more spacings than this away from every node, or outside their rectangle, has left the cloud."""
 
 
 def halfway(velocities: Sequence[Array]) -> Array:
@@ -64,10 +64,11 @@ def runge_kutta(
 
 
 class Markers:
-    """Material points that start at the nodes, carried through the velocities of fixed or shifted nodes.
+    """Material points that start at the nodes and are carried by the velocities of fixed or shifted nodes.
 
-    Between the increments velocities are interpolated in time: through up to four increments at fixed nodes, so that
-    the places are of fourth order in Δt once three have passed, linearly at moving ones, second order as their motion.
+    Within an increment velocities are interpolated in time. At fixed nodes the polynomial goes through up to four
+    velocities, so that places are of fourth order in Δt once three increments have passed. At moving nodes it is linear
+    and places are of second order, like the motion of the nodes.
     """
 
     def __init__(
@@ -78,7 +79,7 @@ class Markers:
         self._known = [(initial.nodes, velocity)]
 
     def advance(self, cloud: Cloud, velocity: Array, time: float) -> None:
-        """Carry the markers over the increment that ends at `time` with the `cloud` and its `velocity` (N, 2)."""
+        """Carry the markers over the increment that ends at `time` [s] with `cloud` and `velocity` (N, 2) [mm/s]."""
         self._known = [(cloud.nodes, velocity), *self._known][: max(HALFWAY)]
         end, start = self._known[:2]
         middle = [(nodes, 0.5 * velocity) for nodes, velocity in (end, start)]
@@ -99,12 +100,12 @@ class Markers:
 
 
 def within(nodes: Array, places: Array) -> Array:
-    """Places (T, 2) outside the rectangle around the nodes, brought back to its edge."""
+    """`places` (T, 2), of which those outside the rectangle around `nodes` (N, 2) are moved to its edge."""
     return np.clip(places, nodes.min(axis=0), nodes.max(axis=0))
 
 
 class Neighbourhoods:
-    """Which nodes j of a cloud are the nearest to each node i, and the distances between them."""
+    """The k nodes j of a cloud that are nearest to each node i, and their distances d_ij [mm], both (N, k)."""
 
     def __init__(self, cloud: Cloud) -> None:
         distance, near = cKDTree(cloud.nodes).query(cloud.nodes, min(NEIGHBOURS + 1, len(cloud.nodes)))
@@ -117,7 +118,7 @@ class Neighbourhoods:
 
 
 class MovingNodes:
-    """Nodes that move with the material, how evenly spaced they stay, and whose neighbours they are.
+    """Nodes that move with the material, their spacing, and their operators.
 
     quality : smallest distance to the nearest node over that of the same node at t = 0, so far.
     searches : how often neighbours were found, so far.
@@ -136,8 +137,10 @@ class MovingNodes:
         self._found: Neighbourhoods | None = None
 
     def operators(self, cloud: Cloud, volumetric: bool) -> Operators:
-        """Of the moved cloud, with the neighbours found last while none has parted by more than the `skin`
-        (lists of Verlet 1967) and while the discretizer can keep them.
+        """The operators of the moved cloud. The neighbours found last are used again while none has parted by more than
+        the `skin` (lists of Verlet 1967) and while the discretizer can keep them.
+
+        Raises SolveError (bad cloud) when supports fail.
         """
         operators = None
         if self._found is not None and self._found.parted(cloud.nodes) <= self.motion.skin:
@@ -153,8 +156,10 @@ class MovingNodes:
     def move(self, cloud: Cloud, velocity: Array, before: Array | None, time: float) -> tuple[Cloud, Any]:
         """x_{k+1} = x_k + Δt (3/2 v_k − 1/2 v_{k−1}) (Adams-Bashforth), then shifted if the motion asks for it.
 
-        Returns the cloud at `time` and, when it was shifted, the matrix (N, N) by which nodal values change with it:
-        values there less values here, so that what is hardly shifted is hardly smoothed.
+        velocity, before : v_k and v_{k−1} of all nodes, shape (N, 2) [mm/s]; None before the first increment.
+        Returns the cloud at `time` [s] and, when it was shifted, the matrix (N, N) that gives the change of nodal
+        values: values interpolated at the shifted nodes less those interpolated at the unshifted ones, so that a small
+        shift smooths little.
         Raises SolveError (bad cloud) when two nodes have come too close.
         """
         step = velocity if before is None else 1.5 * velocity - 0.5 * before

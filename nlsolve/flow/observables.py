@@ -1,4 +1,4 @@
-"""What is measured on a solved flow: its error, the reaction of the moving wall, its fields at the nodes."""
+"""What is measured on a solved flow: its error, the reaction of the moving wall, and its fields at the nodes."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from nlsolve.series import Array
 
 
 def velocity_error(scene: Geometry, flow: Flow, velocity: Array, time: float) -> dict[str, float]:
-    """‖v − v_exact‖₂ / ‖v_exact‖₂ over all nodes and over those inside; empty where the scene has no exact solution."""
+    """‖v − v_exact‖₂ / ‖v_exact‖₂ over all nodes and over the interior ones; empty without exact solution."""
     exact = scene.exact(flow.law, flow.cloud.nodes, time)
     if exact is None:
         return {}
@@ -33,13 +33,13 @@ def _relative(value: Array, exact: Array) -> float:
 
 
 def discretization_error(other: Flow, velocity: Array, linear: LinearSolver) -> float:
-    """‖δ‖₂/‖v‖₂ with J′(v) δ = −R′(v), over the interior nodes, for the `velocity` (N, 2) of a flow that `other`
-    discretises otherwise, by R′: how far a solved velocity is from that of another discretisation of the same nodes.
+    """‖δ‖₂/‖v‖₂ with J′(v) δ = −R′(v), over the interior nodes: how far a solved `velocity` (N, 2) [mm/s] is from that
+    of `other`, R′, another discretisation of the same flow on the same nodes.
 
-    Where the errors of both have little in common, δ is the larger of the two in the main. One Newton step tells, as in
-    defect correction (Stetter 1978; Skeel 1986): R′ is never solved.
+    When the errors of the two have little in common, δ is mainly the larger of them. One Newton step estimates it, as
+    in defect correction (Stetter 1978; Skeel 1986): R′ = 0 is never solved.
 
-    Raises SolveError when `other` has no finite residual there or a singular tangent.
+    Raises SolveError when `other` has no finite residual or a singular tangent at `velocity`.
     """
     u = other.unknowns(velocity)
     residual = other.residual(u)
@@ -61,7 +61,9 @@ def divergence(flow: Flow, velocity: Array) -> float:
 def wall_reaction(
     scene: Geometry, motion: NodeMotion, discretizer: Discretizer, flow: Flow, velocity: Array, time: float
 ) -> dict[str, float]:
-    """Force, and torque about the origin, of the moving wall on the material, with errors; empty without a contour."""
+    """Force [N/mm] and torque about the origin [N mm/mm] of the moving wall on the material, per thickness, with their
+    relative errors when there is an exact solution; empty without a contour.
+    """
     contour, wall = scene.contour(motion), scene.moving_wall
     if contour is None:
         return {}
@@ -120,7 +122,7 @@ def _at_wall(wall: Indices, flow: Flow, u: Array) -> tuple[float, float, float]:
 def nodal_fields(
     scene: Geometry, discretizer: Discretizer, flow: Flow, velocity: Array, initial: Cloud, time: float
 ) -> pd.DataFrame:
-    """A row a node: place at t = 0 and now, velocity, strain rates, exact velocity (columns of `FIELDS`)."""
+    """One row for each node: place at t = 0 and now, velocity, strain rates, exact velocity (columns of `FIELDS`)."""
     nodes = flow.cloud.nodes
     strain_rate = flow.operators.strain_rate(velocity)
     to_nodes = discretizer.values(flow.operators.strain.points, nodes)

@@ -1,4 +1,4 @@
-"""Scenes that are flows: geometry and boundary, and the sections that a flow asks a study for."""
+"""Scenes that are flows: geometry and boundary, and the sections of a study that a flow needs."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from nlsolve.flow.state import FlowParts
 
 
 class FlowScene(Geometry, Scene, ABC):
-    """A flow of one material: R(v) = 0 at a moment, or implicit Euler from a first state at t = 0 to a horizon."""
+    """A flow of one material: one steady R(v) = 0, or implicit Euler from a first state at t = 0 to a horizon."""
 
     sections: ClassVar[Mapping[str, Section]] = {
         "law": Section(ConstitutiveLaw),
@@ -35,10 +35,13 @@ class FlowScene(Geometry, Scene, ABC):
     }
 
     def simulation(self, parts: FlowParts, entry: Entry) -> FlowSimulation:
+        """The flow of a case; `entry` times the building of its operators."""
         return FlowSimulation(parts, entry)
 
     def check(self, parts: Any) -> None:
-        """Nodes move where they may, material is carried once, and the law can go the way to the first state."""
+        """Raises Misfit when nodes move that must stay, when moving nodes are combined with convection, or when the law
+        refuses the continuation to the first state.
+        """
         if parts.motion.moving and self.keeps_nodes:
             raise Misfit("motion", "nodes", f'{self.keeps_nodes}; use nodes = "fixed"')
         if parts.motion.moving and parts.physics.convection:

@@ -1,4 +1,4 @@
-"""A flow at one moment: its nodes, their operators, the pressure, and the velocity solved for last."""
+"""A flow at one time: its nodes, their operators, the pressure, and the velocity that was solved last."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from nlsolve.solving.stopping import Budget, StoppingTest
 
 @dataclass(frozen=True)
 class FlowParts:
-    """The components that a flow is made of, by the names of their sections, with the defaults of a study."""
+    """The components of a flow by the names of their sections, with the defaults of a study."""
 
     scene: Geometry
     law: ConstitutiveLaw
@@ -48,13 +48,16 @@ class FlowParts:
 
 
 class FlowState:
-    """What the equations of a case are now, and the last state that solved them.
+    """The present time, nodes, operators and pressure of a case, and the state that was solved last.
 
-    time : now [s].
-    cloud, operators, gradient : the nodes, B, S, B_θ and S_θ on them, and ∂/∂x, ∂/∂y where convection is kept.
-    pressure : at the volume points, shape (L,) [MPa], iterated where a divergence_tolerance is asked for; None before.
-    velocity, guess : of the nodes, shape (N, 2) [mm/s]: solved for last, and where the next solve begins.
-    flow, unknowns : solved last; None, and absent, before the first.
+    time : the present time [s].
+    cloud : the nodes at that time.
+    operators, gradient : B, S, B_θ and S_θ of these nodes; ∂/∂x and ∂/∂y, or None without convection.
+    pressure : p at the volume points, shape (L,) [MPa]; None until it has been iterated.
+    velocity : of all nodes, solved last, shape (N, 2) [mm/s].
+    guess : velocity of all nodes that the next solve begins with, shape (N, 2) [mm/s].
+    flow, unknowns : the problem solved last, and its solution, shape (2F,). Before the first solve `flow` is None and
+        `unknowns` is not set.
     """
 
     def __init__(self, parts: FlowParts, entry: Entry) -> None:
@@ -70,7 +73,7 @@ class FlowState:
         self.unknowns: Array
 
     def begin(self, cloud: Cloud) -> None:
-        """The cloud at t = 0, its operators, and rest inside."""
+        """Set the cloud at t = 0, build its operators, and start from rest. May raise SolveError (bad cloud)."""
         self.cloud = cloud
         if self.parts.motion.moving:
             self.moving = MovingNodes(
@@ -80,10 +83,11 @@ class FlowState:
         self.velocity = self.guess = np.zeros_like(cloud.nodes)
 
     def move_to(self, time: float, before: Array | None) -> Any:
-        """The nodes and their operators at this time, if they move; velocities come along to shifted nodes.
+        """Go on to `time` [s]: moving nodes get new places and operators, and velocities are carried to shifted nodes.
 
-        before : velocity (N, 2) one increment earlier than the last.
-        Returns the matrix (N, N) by which nodal values change with shifted nodes, else None.
+        before : velocity (N, 2) [mm/s] one increment earlier than the last.
+        Returns the matrix (N, N) that gives the change of nodal values by a shift; None when no node is shifted.
+        May raise SolveError (bad cloud).
         """
         self.time = time
         if self.moving is None:
@@ -95,7 +99,7 @@ class FlowState:
         return carry
 
     def build_operators(self) -> None:
-        """Of the nodes now; the pressure comes along to the new volume points."""
+        """Build the operators of the present nodes; the pressure is interpolated to the new volume points."""
         before = self.operators if self.pressure is not None else None
         with self.entry("operators"):
             if self.moving is None:
@@ -107,7 +111,7 @@ class FlowState:
             self.pressure = self.between_volume_points(before, self.operators) @ self.pressure
 
     def inertia_from(self, before: Array | None) -> Inertia | None:
-        """ρ (V − V_k)/Δt with V_k = `before`, where the physics keep it."""
+        """ρ (V − V_k)/Δt with V_k = `before` (N, 2) [mm/s]; None when the physics leave inertia out."""
         if before is None or not self.parts.physics.inertia:
             return None
         return Inertia(self.parts.physics.density / self.parts.time.increment, before)
@@ -119,7 +123,12 @@ class FlowState:
         load: float = 1.0,
         others: Operators | None = None,
     ) -> Flow:
-        """The balance now, by the operators of the march or by `others` of the same cloud."""
+        """The problem R(u) = 0 at the present time.
+
+        inertia : None without inertia.
+        load : factor on boundary velocities and body forces.
+        others : operators of the same cloud by another discretizer, instead of those of the march.
+        """
         operators = others or self.operators
         pressure = self.pressure
         if others is not None and pressure is not None:
@@ -149,19 +158,19 @@ class FlowState:
         return rate_squared(operators.strain_rate(self.velocity)[:, nearest])
 
     def between_volume_points(self, here: Operators, there: Operators) -> Any:
-        """The matrix that takes pressures from the volume points of some operators to those of others."""
+        """Sparse matrix that takes pressures from the volume points of `here` to those of `there`."""
         assert here.volumetric is not None
         assert there.volumetric is not None
         return self.parts.discretizer.values(here.volumetric.points, there.volumetric.points)
 
     def keep(self, flow: Flow, unknowns: Array) -> None:
-        """A solved state: what is measured, and where the next solve begins."""
+        """Keep a problem with its solution (2F,), which is measured and which the next solve begins with."""
         self.flow, self.unknowns = flow, unknowns
         self.velocity = self.guess = flow.velocity(unknowns)
 
     def error_estimate(self, velocity: Array, before: Array | None) -> float:
-        """By the error estimator, of the `velocity` at the end of an increment that began with `before`; NaN without
-        one.
+        """Relative error of the `velocity` (N, 2) at the end of an increment that began with `before` (N, 2), by the
+        error estimator; NaN without one. May raise SolveError.
         """
         if self.parts.error_estimator is None:
             return float("nan")

@@ -3,8 +3,8 @@
     ρ ∂V/∂t, ρ (V·∇) V beside ∇S      div V beside ε̄      ε₀ beside ε̄      h ∇∇V beside ∇V      S:ε̇/(ρ c_p) beside T
     V beside the V of another discretisation
 
-N nodes, M strain points. An audit above its limit names the switch to turn on. A term the scene keeps has no audit
-(NaN). All but the heating put the result itself in doubt.
+N nodes, M strain points. An audit above its limit names the switch to turn on. A term that the scene keeps has no
+audit (NaN). Every audit above its limit puts the result in doubt, except that of heating.
 """
 
 from __future__ import annotations
@@ -33,17 +33,23 @@ NEAR_REGULARIZATION = 10.0
 NEIGHBOURS = 6
 
 SAFETY = 1.5
-"""An estimate of an error, times this factor, is to cover the error (on such factors Roache 1994): over the cases of
-studies/discretizers.toml the estimate is never below 0.68 of the error inside. Chosen with extremes.toml in sight.
+"""The estimate of an error times this factor should cover the error (on such factors Roache 1994). Over the cases of
+studies/discretizers.toml the estimate is never below 0.68 of the error inside; extremes.toml was known when the factor
+was chosen.
 """
 
 ROUNDING = 1e-6
-"""‖∇S‖ below this part of |S| over the size of the cloud is the rounding of a uniform stress."""
+"""A ‖∇S‖ smaller than this times |S| over the size of the cloud is the rounding of a uniform stress."""
 
 
 @dataclass(frozen=True)
 class Limit:
-    """The largest value that passes without a word, and the word."""
+    """The limit of an audit.
+
+    largest : the largest value that passes.
+    sentence : what a larger value means, and the way out.
+    doubt : whether a larger value puts the result in doubt.
+    """
 
     largest: float
     sentence: str
@@ -76,9 +82,10 @@ def audit(
 ) -> dict[str, Any]:
     """The columns `audit.…`, `velocity_error_estimate` and `doubt` of a solved flow with `velocity` (N, 2).
 
-    change : ∂V/∂t (N, 2) [mm/s²] over the last increment, of moving nodes dV/dt; None for a steady scene.
-    time : reached by the march [s], 0 for a steady scene.
-    estimate : of the relative error of the velocity inside, by another discretisation; NaN where there is none.
+    change : ∂V/∂t (N, 2) [mm/s²] over the last increment, dV/dt for moving nodes; None for a steady scene.
+    time : time that the march has reached [s]; 0 for a steady scene.
+    estimate : returns the relative error of the velocity inside, estimated by another discretisation; NaN without one.
+    When an operator cannot be built, the only column is a `doubt` with the reason.
     """
     try:
         gradient = parts.discretizer.gradient(flow.cloud)
@@ -121,8 +128,8 @@ def _size(stress_slopes: Array) -> float:
 def _balance(
     parts: FlowParts, flow: Flow, velocity: Array, change: Array | None, slopes: Array, stress_slopes: Array
 ) -> float:
-    """‖div S + f − ρ dV/dt‖₂ / ‖∇S‖₂ over the interior nodes, where no pressure acts: the balance that was solved, once
-    more by operators that had no part in it. Steady spin: up to 0.17 where the error inside is below 5 %.
+    """‖div S + f − ρ dV/dt‖₂ / ‖∇S‖₂ over the interior nodes, where no pressure acts: the solved balance, evaluated
+    by operators that had no part in the solve. Steady spin: up to 0.17 where the error inside is below 5 %.
     """
     if flow.dilatation_rate(flow.unknowns(velocity)) is not None:
         return float("nan")
@@ -144,7 +151,7 @@ def _balance(
 def _accelerations(
     parts: FlowParts, flow: Flow, velocity: Array, change: Array | None, slopes: Array, stress_slopes: float
 ) -> dict[str, float]:
-    """‖ρ ∂V/∂t‖/‖∇S‖ and ‖ρ (V·∇) V‖/‖∇S‖ over the interior nodes, each where the scene has no such term."""
+    """‖ρ ∂V/∂t‖/‖∇S‖ and ‖ρ (V·∇) V‖/‖∇S‖ over the interior nodes, each when the scene has no such term."""
     inside = flow.cloud.interior
     missing = {}
     if change is not None and not parts.physics.inertia:
@@ -159,7 +166,7 @@ def _accelerations(
 
 
 def _compressibility(flow: Flow, velocity: Array, slopes: Array) -> float:
-    """‖div V‖/‖ε̄‖, where the volumetric term takes it, or at the interior nodes."""
+    """‖div V‖/‖ε̄‖, at the volume points with a volumetric term, at the interior nodes without one."""
     if flow.dilatation_rate(flow.unknowns(velocity)) is not None:
         return divergence(flow, velocity)
     (exx, vx), (uy, eyy) = slopes[:, flow.cloud.interior].transpose(0, 2, 1)
@@ -179,8 +186,8 @@ def _residual(flow: Flow, velocity: Array) -> float:
 def _regularization(flow: Flow, strain_rate: Array) -> dict[str, float]:
     """Shares of the strain points with ε̄ < 10 ε₀, of Σ |S| and of Σ ε̄ that they carry.
 
-    The last tells what ε₀ does to velocities: 0.002, 0.02 and 0.07 of it change the steady spin inside by 0.9 %, 8 %
-    and 22 %, whatever the share of the stress.
+    The share of Σ ε̄ measures the effect of ε₀ on velocities: shares of 0.002, 0.02 and 0.07 go with changes of the
+    steady spin inside by 0.9 %, 8 % and 22 %, whatever the share of the stress.
     """
     names = ("audit.regularization", "audit.regularization_stress", "audit.regularization_strain")
     regularization = flow.law.regularization_rate
@@ -197,7 +204,7 @@ def _resolution(flow: Flow, velocity: Array, slopes: Array) -> float:
 
     Large where a layer is thinner than the spacing, and where velocities alternate from node to node unseen by their
     gradients. Steady spin by moving least squares, eight clouds and forms, four indices: below 0.23 where the error
-    inside is below 2 %, above 0.5 where it is above 9 %. A velocity that is wrong yet smooth is not noticed.
+    inside is below 2 %, above 0.5 where it is above 9 %. A wrong velocity that is smooth goes unnoticed.
     """
     nodes = flow.cloud.nodes
     near = cKDTree(nodes).query(nodes, min(NEIGHBOURS + 1, len(nodes)))[1][:, 1:]
@@ -210,7 +217,7 @@ def _resolution(flow: Flow, velocity: Array, slopes: Array) -> float:
 
 
 def _heating(parts: FlowParts, flow: Flow, strain_rate: Array, time: float) -> float:
-    """max S:ε̇/(ρ c_p) · time [K], in a steady scene over a time 2π/reference rate (a turn of a tool)."""
+    """max S:ε̇/(ρ c_p) · time [K]; in a steady scene the time is 2π/reference rate (one turn of a tool)."""
     power = CONTRACTION @ (stress(flow.law, strain_rate) * strain_rate)
     return float(power.max() / (parts.physics.density * HEAT_CAPACITY)) * (
         time or 2.0 * np.pi / parts.scene.reference_rate

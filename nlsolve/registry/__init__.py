@@ -1,4 +1,4 @@
-"""What is installed, by contract and kind, and the sentences for what a document asks of it in vain.
+"""The installed component classes by contract and kind, and sentences for the mistakes in a study, with file and line.
 
 It may import contracts.
 """

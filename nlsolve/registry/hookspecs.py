@@ -1,4 +1,4 @@
-"""The hooks that a plugin may implement, each with an example that the tests run. There is one.
+"""The hooks that a plugin may implement, each with an example that the tests run. There is one hook.
 
 A plugin is a module, found by its entry point in the group `nlsolve`. In the pyproject.toml of its package:
 
@@ -15,7 +15,7 @@ import pluggy
 from nlsolve.contracts.component import Component
 
 PROJECT = "nlsolve"
-"""Name of the entry-point group, and of the project that the markers of hooks belong to."""
+"""Name of the entry-point group, and the project name in the markers of hooks."""
 
 hookspec = pluggy.HookspecMarker(PROJECT)
 hookimpl = pluggy.HookimplMarker(PROJECT)
@@ -46,6 +46,6 @@ def nlsolve_components() -> Iterable[type[Component]]:  # type: ignore[empty-bod
         def nlsolve_components():
             return [Honey]
 
-    A hook that raises, or that returns anything else than concrete component classes, costs its own plugin only:
-    `nlsolve plugins` shows a row with the reason.
+    When a hook raises, or returns anything but concrete component classes, its own plugin is left out and the others
+    work: `nlsolve plugins` shows a row with the reason.
     """

@@ -1,7 +1,7 @@
 """Components inside components: `solver = { kind = "newton", globalization = { kind = "cubic" } }`.
 
-A field of type `Globalized` takes any installed globalisation, a stranger's too: its kind is looked up when a value
-arrives, for plugins are still being imported when the field is declared. The default of such a field is a table.
+A field of type `Globalized` takes any installed globalisation, a stranger's too. The kind is looked up when a value is
+validated, because plugins are still being imported when the field is declared. The default of such a field is a table.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from nlsolve.registry.registry import load_registry
 
 
 def installed(contract: type[Component]) -> BeforeValidator:
-    """A table with a kind -> the installed component of this contract; what is wrong is told in its own place."""
+    """A validator that turns a table with a kind into a component of this contract, and reports mistakes in place."""
 
     def component(value: Any) -> Component:
         return load_registry().component(contract.noun, value)

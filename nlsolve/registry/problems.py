@@ -1,4 +1,4 @@
-"""What is wrong with a study, in sentences: file, line, dotted place, offending value, what is expected instead."""
+"""The mistakes in a study as sentences: file, line, dotted place, offending value, and what is expected instead."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ from nlsolve.registry.registry import CONTRACTS, load_registry
 from nlsolve.registry.toml_lines import Place, nearest_line
 
 LONGEST_VALUE = 60
-"""Characters of an offending value that are worth repeating."""
+"""Longest offending value that a sentence repeats, in characters."""
 
 ABSENT = object()
-"""Stands for a value that is not there, or not worth repeating."""
+"""Stands for a value that is missing, or that the sentence need not repeat."""
 
 MOVED: dict[str, str] = {
     "counterpart": "error_estimator",
@@ -39,11 +39,11 @@ MOVED: dict[str, str] = {
     "scene.probe": "record.probe",
     "budget.pressures": "physics.pressure_iterations",
 }
-"""Dotted places of sections and fields of older study files, and what these are called now."""
+"""Dotted places of sections and fields in older study files, and their present names."""
 
 
 class StudyError(InputError):
-    """A study that cannot be run as it is written. The message has one sentence, on its own line, for every problem."""
+    """A study cannot be run as it is written. The message has one sentence, on its own line, for each mistake."""
 
     def __init__(self, *problems: str) -> None:
         super().__init__("\n".join(problems))
@@ -52,14 +52,14 @@ class StudyError(InputError):
 
 @dataclass(frozen=True)
 class Problem:
-    """One thing that is wrong: where in the document, what stands there, and what was expected."""
+    """One mistake in a document: its place, the value there, and what is expected instead."""
 
     place: Place
     value: Any
     expected: str
 
     def sentence(self, source: Source) -> str:
-        """The problem for people, beginning with the place to look at."""
+        """The mistake in a sentence that begins with file and line."""
         text = repr(self.value)
         shown = f" = {text}" if self.value is not ABSENT and len(text) <= LONGEST_VALUE and "\n" not in text else ""
         return f"{source.of(self.place)}: {dotted(self.place)}{shown}: {self.expected}"
@@ -69,9 +69,9 @@ class Problem:
 class Source:
     """Where the parts of a document were written.
 
-    file : name of the study file, or what stands for it.
-    lines : line of every place in it.
-    aliases : dotted names that were last set somewhere else (a sweep, [quick], --set), and where that is.
+    file : name of the study file, or of the caller that gave the document.
+    lines : line of each place in the file.
+    aliases : dotted names that were last set elsewhere (in a sweep, [quick] or --set), and where they were set.
     """
 
     file: str
@@ -84,7 +84,7 @@ class Source:
         return self.file if line is None else f"{self.file}, line {line}"
 
     def of(self, place: Place) -> str:
-        """Where the value now standing at a place was written."""
+        """Where the value at a place was set last: in a sweep, [quick] or --set, or on a line of the file."""
         name = dotted(place)
         for alias in sorted(self.aliases, key=len, reverse=True):
             if name == alias or name.startswith(f"{alias}."):
@@ -94,7 +94,7 @@ class Source:
 
 
 def dotted(place: Place) -> str:
-    """scene.nodes.spacing, table[0].rows"""
+    """A place in dotted form: scene.nodes.spacing, table[0].rows."""
     name = ""
     for part in place:
         name += f"[{part}]" if isinstance(part, int) else f".{part}" if name else part
@@ -102,7 +102,7 @@ def dotted(place: Place) -> str:
 
 
 def did_you_mean(name: str, names: Iterable[str]) -> str:
-    """A question with the nearest valid name, or else the list of valid names."""
+    """A question with the nearest valid name; when none is near, the list of valid names."""
     names = list(names)
     nearest = get_close_matches(name, names, n=1)
     return f"did you mean {nearest[0]!r}?" if nearest else f"there are {', '.join(map(repr, names)) or 'none'}"
@@ -117,7 +117,7 @@ def moved_name(name: str) -> str | None:
 
 
 def unknown(place: Place, value: Any, reason: str, names: Iterable[str]) -> Problem:
-    """A name that there is not: what it is called now if it had its place once, else `reason` and the nearest name."""
+    """The mistake of an unknown name: its present name when it has been renamed, else `reason` and the nearest name."""
     name = dotted(place)
     if (moved := moved_name(name)) is not None:
         return Problem(place, ABSENT, f"this is called {moved} now")
@@ -125,14 +125,14 @@ def unknown(place: Place, value: Any, reason: str, names: Iterable[str]) -> Prob
 
 
 def problems_in(error: ValidationError, model: type[BaseModel], document: Any) -> list[Problem]:
-    """The problems pydantic found in a document, told in the document's own places; one for each place."""
+    """The mistakes that pydantic found, by the places of the document itself; one for each place."""
     found: dict[Place, Problem] = {}
     for detail in error.errors(include_url=False):
         problem = _problem(detail, model, document)
         earlier = found.get(problem.place)
         if earlier is None:
             found[problem.place] = problem
-        elif problem.expected not in earlier.expected:  # the members of a union complain one by one
+        elif problem.expected not in earlier.expected:  # each member of a union reports a mistake of its own
             both = f"{earlier.expected} or {problem.expected}"
             found[problem.place] = Problem(problem.place, problem.value, both)
     return list(found.values())
@@ -167,7 +167,7 @@ def _choice(value: object, expected: str) -> str:
 
 
 def _place_in(document: Any, loc: Place, missing: bool) -> Place:
-    """The part of pydantic's location that is in the document: without tags of unions and names of types."""
+    """The part of pydantic's location that is in the document, without the tags of unions and the names of types."""
     place: list[str | int] = []
     for depth, part in enumerate(loc):
         if _holds(document, part):
@@ -185,7 +185,7 @@ def _holds(document: Any, part: str | int) -> bool:
 
 
 def _fields_at(model: type[BaseModel], place: Place, document: Any) -> list[str]:
-    """The fields of the model that is responsible for a place in the document."""
+    """The fields of the model that validates a place in the document."""
     candidates = [model]
     for part in place:
         if isinstance(part, str):
@@ -196,7 +196,7 @@ def _fields_at(model: type[BaseModel], place: Place, document: Any) -> list[str]
 
 
 def _chosen(candidates: list[type[BaseModel]], document: Any) -> type[BaseModel]:
-    """Of several models, the one whose `kind` the document names; or the class that a table was made from."""
+    """The model whose `kind` the document names, or the class that a table was made from."""
     if isinstance(document, ComponentTable):
         return document.cls
     for candidate in candidates:
@@ -211,7 +211,7 @@ def _chosen(candidates: list[type[BaseModel]], document: Any) -> type[BaseModel]
 
 
 def _models_in(annotation: Any) -> list[type[BaseModel]]:
-    """The models mentioned in a type: Annotated[A | B, …], list[A], …; of a contract, those that are installed."""
+    """The models in a type such as Annotated[A | B, …] or list[A]; for a contract, its installed classes."""
     if isinstance(annotation, type) and issubclass(annotation, Component) and annotation in CONTRACTS.values():
         return list(load_registry().classes(annotation.noun).values())
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):

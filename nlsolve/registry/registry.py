@@ -1,7 +1,7 @@
-"""What is installed: the component classes that plugins offer, by noun and kind.
+"""The component classes that installed plugins offer, by noun and kind.
 
-A plugin that cannot be imported or registered does not disturb the others: it becomes a row with the reason. A kind
-that two plugins offer cannot be used until one of the two packages is removed.
+A plugin that cannot be imported or registered becomes a row with the reason, and the other plugins work. A kind that
+two plugins offer cannot be used until one of the two packages is removed.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ CONTRACTS: dict[str, type[Component]] = {
         Globalization,
     )
 }
-"""What a plugin may offer, by noun, in the order of a study file."""
+"""The contracts whose classes a plugin may offer, by noun, in the order of a study file."""
 
 
 RENAMED_KINDS = {("scene", "system"): "published"}
@@ -53,7 +53,7 @@ RENAMED_KINDS = {("scene", "system"): "published"}
 
 @dataclass(frozen=True)
 class Parameter:
-    """One field of a component, for people to read."""
+    """One field of a component, as `nlsolve plugins` prints it."""
 
     name: str
     type: str
@@ -63,7 +63,11 @@ class Parameter:
 
 @dataclass(frozen=True)
 class PluginRow:
-    """One offered component, or (`failure` set) why a plugin or a kind is not there."""
+    """One row of `nlsolve plugins`: an offered component class, or a plugin that failed.
+
+    source : distribution, version and module that it comes from.
+    failure : why the plugin or the kind cannot be used; None when it can.
+    """
 
     noun: str
     kind: str
@@ -79,7 +83,7 @@ class _Offer:
 
 
 class Registry:
-    """Component classes by noun and kind, and what went wrong on the way to them."""
+    """Component classes by noun and kind, and the plugins that failed, with the reason."""
 
     def __init__(self) -> None:
         self._manager = pluggy.PluginManager(hookspecs.PROJECT)
@@ -89,14 +93,14 @@ class Registry:
 
     @classmethod
     def installed(cls) -> Registry:
-        """A registry of everything in the entry-point group, one entry at a time, in the order of their names."""
+        """A registry of all plugins in the entry-point group, loaded in the order of their names."""
         registry = cls()
         for entry in sorted(entry_points(group=hookspecs.PROJECT), key=lambda entry: (entry.name, entry.value)):
             registry.load(entry)
         return registry
 
     def load(self, entry: EntryPoint) -> None:
-        """Import one entry point and register what it holds; a failure becomes a row."""
+        """Import the plugin of one entry point and register it; a failure becomes a row."""
         source = f"{entry.dist.name} {entry.dist.version} ({entry.value})" if entry.dist else entry.value
         try:
             plugin = entry.load()
@@ -116,16 +120,16 @@ class Registry:
             self._offers.setdefault((cls.noun, cls.kind_name()), []).append(_Offer(cls, source))
 
     def _offered_by(self, plugin: object) -> list[type[Component]]:
-        """The checked classes of one plugin, which is asked alone: one that fails must not silence the others.
+        """The checked classes of one plugin. Its hook is called alone, so that a failure concerns no other plugin.
 
-        A plugin that fails is unregistered again. Raises whatever its hook raises, and TypeError or pluggy's
-        PluginValidationError for a plugin that does not keep to the hook.
+        A plugin that fails is unregistered again. Raises whatever its hook raises, ValueError for a plugin that is
+        registered already, and TypeError or pluggy's PluginValidationError for one that does not follow the hook.
         """
         if self._manager.is_registered(plugin):
             raise ValueError("it is registered already")
         try:
             self._manager.register(plugin)
-            self._manager.check_pending()  # a marked function whose name is no hook's
+            self._manager.check_pending()  # fails on a marked function that has not the name of a hook
             others = self._manager.get_plugins() - {plugin}
             answers = self._manager.subset_hook_caller(hookspecs.nlsolve_components.__name__, others)()
             if not answers:
@@ -151,7 +155,7 @@ class Registry:
         }
 
     def complaint(self, noun: str, kind: object) -> str | None:
-        """Why no class can be had for this noun and kind, in one sentence; None when there is one."""
+        """Why this noun and kind have no usable class, in one sentence; None when they have one."""
         classes = self.classes(noun)
         if isinstance(kind, str) and kind in classes:
             return None
@@ -169,7 +173,10 @@ class Registry:
         return f"no such {noun}; {guess}installed: {', '.join(classes) or 'none'}{failed}"
 
     def known(self, noun: str, value: object) -> object:
-        """A component of this noun, or a table of one, as it is; PydanticCustomError for anything else."""
+        """`value` itself when it is a component of this noun or a table of one.
+
+        Raises PydanticCustomError for anything else.
+        """
         if isinstance(value, Component | ComponentTable):
             self._check_class(noun, value.cls if isinstance(value, ComponentTable) else type(value))
         if isinstance(value, Component) or own_class(value) is not None:
@@ -190,7 +197,7 @@ class Registry:
         return value
 
     def _check_class(self, noun: str, cls: type[Component]) -> None:
-        """PydanticCustomError for a class of another contract, or without a kind."""
+        """Raises PydanticCustomError for a class of another contract or without a kind."""
         told = {"name": cls.__name__, "given": cls.noun, "noun": noun, "kinds": ", ".join(self.classes(noun)) or "none"}
         if not issubclass(cls, CONTRACTS[noun]):
             message = "{name} is a {given}, where a {noun} belongs; installed: {kinds}"
@@ -201,7 +208,7 @@ class Registry:
             raise PydanticCustomError("kind_undeclared", "{reason}", {"reason": str(error)}) from error
 
     def class_of(self, noun: str, value: object) -> type[Component] | None:
-        """The class that a component is of, or a table names; None where there is none of that name."""
+        """The class of a component, or the class that a table names; None when the table names no usable class."""
         if isinstance(value, Component):
             return type(value)
         if (own := own_class(value)) is not None:
@@ -210,19 +217,19 @@ class Registry:
         return self.classes(noun).get(kind) if isinstance(kind, str) else None
 
     def component(self, noun: str, value: object) -> Component:
-        """A component as it is; a table as an instance of the class it names. Installed or not: any class will do.
+        """`value` itself when it is a component, of any class, installed or not; the component of a table otherwise.
 
-        Raises PydanticCustomError where there is no such class, ValidationError where a field is wrong.
+        Raises PydanticCustomError when there is no such class, ValidationError when a field is wrong.
         """
         known = self.known(noun, value)
         if isinstance(known, Component):
             return known
         cls = self.class_of(noun, known)
-        assert cls is not None  # or it would not be known
+        assert cls is not None  # because `known` has found it
         return cls.model_validate(known)
 
     def is_installed(self, component: Component) -> bool:
-        """Whether its noun and kind name this very class."""
+        """Whether the registry has the component's own class under its noun and kind."""
         return self.classes(component.noun).get(component.kind_name()) is type(component)
 
     def union(self, noun: str) -> Any:
@@ -248,12 +255,12 @@ class Registry:
 
 @cache
 def load_registry() -> Registry:
-    """The registry of this process, loaded at the first call."""
+    """The registry of the installed plugins, loaded at the first call in a process."""
     return Registry.installed()
 
 
 def _checked(cls: Any) -> type[Component]:
-    """`cls`, a concrete component of a known noun with a literal kind; otherwise a TypeError in a sentence."""
+    """`cls` when it is a concrete component class of a contract with a literal kind. Raises TypeError otherwise."""
     contracts = tuple(CONTRACTS.values())
     if not (isinstance(cls, type) and issubclass(cls, Component) and issubclass(cls, contracts)):
         raise TypeError(f"{cls!r} is not a subclass of one of {', '.join(c.__name__ for c in contracts)}")

@@ -1,4 +1,4 @@
-"""Where a TOML file says what: the line of every key, which `tomllib` does not tell."""
+"""The line of every key of a TOML file, which `tomllib` does not give."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def lines_of(text: str) -> dict[Place, int]:
 
 
 def nearest_line(lines: dict[Place, int], place: Place) -> int | None:
-    """The line of a place, or of the closest place around it that is written in the file."""
+    """The line of a place, or of the closest enclosing place that is written in the file; None when there is none."""
     for length in range(len(place), 0, -1):
         if place[:length] in lines:
             return lines[place[:length]]
@@ -33,7 +33,7 @@ def nearest_line(lines: dict[Place, int], place: Place) -> int | None:
 
 
 class _Scanner:
-    """Recursive descent over tokens; the grammar is lenient because `tomllib` has been there before."""
+    """Recursive descent over tokens; the grammar is lenient because `tomllib` has accepted the text before."""
 
     def __init__(self, text: str) -> None:
         self.lines: dict[Place, int] = {}
@@ -56,7 +56,7 @@ class _Scanner:
         return self._tokens[self._next][1]
 
     def _skip(self, text: str) -> bool:
-        """Step over one token when it is this one."""
+        """Step over the next token if it is `text`, and say whether it was."""
         found = self._peek() == text
         self._next += found
         return found
@@ -81,7 +81,7 @@ class _Scanner:
         return place
 
     def _keys(self) -> list[str]:
-        """a.b."c d" as its parts."""
+        """The parts of a dotted key such as a.b."c d"."""
         keys = []
         while True:
             text = self._peek()
@@ -91,7 +91,7 @@ class _Scanner:
                 return keys
 
     def _pair(self, base: Place) -> None:
-        """key = value"""
+        """Read one line `key = value`."""
         line = self._line()
         place = base
         for key in self._keys():

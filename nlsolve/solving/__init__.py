@@ -1,4 +1,4 @@
-"""One problem, one method: the loop that stops it, the kept tangent K*, and the ledger that counts and times its work.
+"""One method on one problem: the loop that takes and stops its steps, the tangent K*, and the ledger of its work.
 
 It may import series, contracts and results.
 """

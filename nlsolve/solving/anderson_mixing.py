@@ -11,7 +11,10 @@ WORST_CONDITION = 1e8  # of R in ΔF = Q R: beyond it γ amplifies the rounding 
 
 
 class Mixing:
-    """The last `depth` changes of u and f, and the next u from them.
+    """Keeps the last changes of u and f, and gives the next u.
+
+    depth : the largest number m of changes that are kept.
+    damping : β.
 
     ΔU, ΔF : (U, m), m ≤ depth; the columns u_{j+1} − u_j and f_{j+1} − f_j, oldest first.
     """
@@ -21,7 +24,7 @@ class Mixing:
         self.forget()
 
     def forget(self) -> None:
-        """Begin again: f is another function from now on."""
+        """Forget all changes, because f is another function from now on."""
         self._last: tuple[np.ndarray, np.ndarray] | None = None
         self._states: list[np.ndarray] = []
         self._changes: list[np.ndarray] = []

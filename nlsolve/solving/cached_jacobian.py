@@ -1,4 +1,4 @@
-"""J(u), assembled once for all who ask at the same u."""
+"""J(u), assembled only once while u stays the same."""
 
 from __future__ import annotations
 
@@ -12,7 +12,10 @@ from nlsolve.series import Array
 
 
 def cached_jacobian(problem: NonlinearProblem) -> Callable[[Array], Any]:
-    """u ↦ J(u), which keeps the last J: for a method that factorises it into K* and multiplies with it too."""
+    """u -> J(u), sparse (U, U), which keeps the last J.
+
+    For a method that both factorises J into K* and multiplies with it at the same u (U,).
+    """
     last: tuple[Array, Any] | None = None
 
     def jacobian(u: Array) -> Any:

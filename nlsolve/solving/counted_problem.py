@@ -1,4 +1,4 @@
-"""R(u) = 0 with all that is asked of it counted and timed: the problem as a method receives it."""
+"""The problem as a method receives it: R(u) = 0 with its work counted and timed."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ from nlsolve.solving.ledger import Ledger
 
 
 class CountedExpansion(Expansion):
-    """Each new order is a `series_order`, and j series terms, for order j convolves j earlier ones."""
+    """An expansion whose order j counts as one `series_order` and j `series_term`: it convolves j earlier orders."""
 
     def __init__(self, expansion: Expansion, ledger: Ledger) -> None:
         self._expansion, self._ledger = expansion, ledger
         self._known = 1  # R_0 is the residual, counted where the expansion was made
 
     def coefficient(self, j: int) -> Array:
-        """R_j. Orders that are skipped over are computed and counted too; an order asked for again is not."""
+        """R_j, (U,). Unknown orders up to j are computed and counted; a known order costs nothing."""
         while self._known <= j:
             with self._ledger.entry("series_order"):
                 self._expansion.coefficient(self._known)
@@ -32,22 +32,24 @@ class CountedExpansion(Expansion):
         return self._expansion.coefficient(j)
 
     def remainder(self, j: int) -> Array:
-        """Q_j, which costs an order of its own: the coefficient R_j is not known by it."""
+        """Q_j, (U,), counted as one order. R_j is not known from it and counts when it is asked for."""
         self.coefficient(j - 1)
         with self._ledger.entry("series_order"):
             return self._expansion.remainder(j)
 
     def append(self, coefficient: Array) -> None:
+        """Push u_j, (U,), which is not counted."""
         self._expansion.append(coefficient)
 
     def path(self, a: float) -> Array:
+        """u(a), (U,), which is not counted."""
         return self._expansion.path(a)
 
 
 class CountedProblem(NonlinearProblem):
     """A problem whose residuals, Jacobians, products with them and series are entered in a ledger.
 
-    The driver, which checks what a method did, asks for `uncounted_residual` and `uncounted_scale`.
+    The driver judges the states of a method by `uncounted_residual` and `uncounted_scale`.
     """
 
     def __init__(self, problem: NonlinearProblem, ledger: Ledger) -> None:
@@ -58,19 +60,22 @@ class CountedProblem(NonlinearProblem):
 
     @property
     def has_series(self) -> bool:
+        """See `NonlinearProblem`."""
         return self._problem.has_series
 
     def residual(self, u: Array) -> Array:
+        """R(u), (U,), counted as a residual."""
         with self._ledger.entry("residual"):
             residual = self._problem.residual(u)
-        self._last = u.copy(), residual.copy()  # a method may go on working in its arrays
+        self._last = u.copy(), residual.copy()  # a method may overwrite its arrays later
         return residual
 
     def jacobian(self, u: Array) -> CountedMatrix:
+        """J(u), (U, U), counted as a Jacobian. Raises SolveError (not applicable) when the problem has none."""
         return self._assembled(self._problem.jacobian, u)
 
     def secant(self, u: Array) -> CountedMatrix:
-        """A(u), which is assembled like a Jacobian and counted as one."""
+        """A(u), (U, U), counted as a Jacobian. Raises SolveError (not applicable) when the problem has none."""
         return self._assembled(self._problem.secant, u)
 
     def _assembled(self, assemble: Callable[[Array], Any], u: Array) -> CountedMatrix:
@@ -80,6 +85,10 @@ class CountedProblem(NonlinearProblem):
         return counted(matrix, self._ledger)
 
     def expand(self, u: Array) -> Expansion:
+        """The expansion around u (U,), counted as an expansion and a residual, which is its R_0.
+
+        Raises SolveError (not applicable) when the problem has none.
+        """
         way_out = "choose a method that needs no series, such as newton or anderson"
         with self._ledger.entry("residual"), self._not_applicable_without_series(way_out):
             expansion = self._problem.expand(u)
@@ -89,7 +98,7 @@ class CountedProblem(NonlinearProblem):
 
     @contextmanager
     def _not_applicable_without_series(self, way_out: str) -> Iterator[None]:
-        """Turn a formula's refusal of series into the ending of a method that needs one."""
+        """Turn NoSeries, which a formula raises, into SolveError (not applicable)."""
         try:
             yield
         except NoSeries as refusal:
@@ -99,11 +108,12 @@ class CountedProblem(NonlinearProblem):
             ) from refusal
 
     def blame(self, u: Array, residual: Array) -> Mapping[str, float]:
+        """See `NonlinearProblem`; not counted."""
         return self._problem.blame(u, residual)
 
     def scale(self, u: Array) -> float:
-        """What ‖R‖ is compared with. Where the driver has asked for it a method may read it for nothing, as it may read
-        its tolerance; elsewhere it costs what a residual costs.
+        """The size that ‖R(u)‖ is divided by. At a state where the driver knows it, a method reads it at no cost;
+        elsewhere it is counted as a residual.
         """
         if u.tobytes() in self._scales:
             return self._scales[u.tobytes()]
@@ -111,12 +121,12 @@ class CountedProblem(NonlinearProblem):
             return self._problem.scale(u)
 
     def uncounted_scale(self, u: Array) -> float:
-        """What ‖R‖ is compared with, off the clock."""
+        """The size that ‖R(u)‖ is divided by, not counted and not timed; `scale` gives it at no cost afterwards."""
         scale = self._scales[u.tobytes()] = self._problem.scale(u)
         return scale
 
     def uncounted_residual(self, u: Array) -> Array:
-        """R(u), off the clock; not evaluated again where the method has just evaluated it at this very state."""
+        """R(u), (U,), not counted and not timed; reused when the method has evaluated it last at the same state."""
         if self._last is not None and np.array_equal(u, self._last[0]):
             return self._last[1]
         return self._problem.residual(u)

@@ -1,4 +1,4 @@
-"""The one loop: every method is stopped by the same outside test, and every ending becomes a status."""
+"""The one loop around every method: a test outside the method stops it, and every ending becomes a status."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from nlsolve.solving.stopping import Budget, StoppingTest
 from nlsolve.solving.tangent import Tangent
 
 GROWTH_OF_DIVERGENCE = 1e6  # residual over the larger of its first value and its scale
-PATIENCE = 40  # steps without a new smallest residual before a method is said to stagnate
+PATIENCE = 40  # steps without a new smallest residual after which a method has stagnated
 
 
 @np.errstate(all="ignore")  # what is not finite becomes a status, not a warning
@@ -32,9 +32,10 @@ def solve(
     budget: Budget,
     ledger: Ledger,
 ) -> Outcome:
-    """Take steps of `solver` on `problem` from `start` until the stopping test, the budget or a failure ends it.
+    """Take steps of `solver` on `problem` from `start` (U,) until the stopping test, the budget or a failure ends them.
 
-    After every step ‖R_new‖/‖R_old‖ is measured here, for the table of steps and for the refresh rule of `tangent`.
+    After every step the driver measures ‖R_new‖/‖R_old‖ for the table of steps and for the refresh rule of `tangent`.
+    A SolveError of the method becomes the status of the outcome; any other error is raised.
     """
     counted, begun, renewals = CountedProblem(problem, ledger), ledger.copy(), tangent.renewals
     scale = counted.uncounted_scale(start)
@@ -81,7 +82,7 @@ def solve(
         contraction = (size / size_before if size_before else 0.0) if number else None
         tangent.step_taken(contraction)
         difference = stop.difference(step.state, before) if number else np.nan
-        before = step.state.copy()  # a method may go on working in its array
+        before = step.state.copy()  # a method may overwrite its array later
         measured = {
             "step": number,
             "tangents": tangent.renewals,
@@ -98,7 +99,7 @@ def solve(
         if not np.isfinite(residual_norm):
             return ended(Status.OUT_OF_DOMAIN if np.isfinite(step.state).all() else Status.NON_FINITE)
         if stop.met(step, residual_norm, difference):
-            claimed |= not solved  # the test of differences speaks for the method
+            claimed |= not solved  # a test of differences accepts a state without its residual
             return ended(Status.CONVERGED)
         if number == 0:
             first = residual_norm

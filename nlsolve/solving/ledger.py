@@ -22,17 +22,17 @@ COUNTED = {
 """Columns of `nlsolve.results.columns.RUNS`, and the kinds of work that they count."""
 
 COUNTED_BESIDES = {"expansions": "expansion", "series_terms": "series_term", "matrix_products": "matrix_product"}
-"""The same of what a cost model wants to know besides."""
+"""Further columns of `runs`, for a cost model, and the kinds of work that they count."""
 
 KINDS = ("residual", "jacobian", "matrix_product", "factorization", "triangular_solve", "series_order")
 
 
 @dataclass
 class Ledger:
-    """Counts and seconds by kind of work; the kind "method" holds the time spent inside a method, all included.
+    """Counts and seconds by kind of work; the kind "method" holds all time spent inside a method.
 
-    clock : seconds since some moment; those the processor worked for this process, which other programs do not
-        lengthen, or those that passed.
+    clock : returns seconds, by default those that the processor has worked for this process, which other programs do
+        not lengthen.
     """
 
     clock: Callable[[], float] = time.process_time
@@ -50,7 +50,7 @@ class Ledger:
             self.counts[kind] += 1
 
     def work(self) -> dict[str, float]:
-        """What a method has asked for, and the seconds it took, under the names of `nlsolve.results.columns.RUNS`."""
+        """Counts and seconds of the work, under the names of `nlsolve.results.columns.RUNS`."""
         return {
             **{column: self.counts[kind] for column, kind in COUNTED.items()},
             "seconds": self.seconds["method"],
@@ -68,7 +68,7 @@ class Ledger:
         return self.seconds[kind] / self.counts[kind] if self.counts[kind] else float("nan")
 
     def details(self) -> dict[str, float]:
-        """What a cost model wants to know besides the counts and seconds by kind, by the names of columns."""
+        """Further counts for a cost model, and the seconds of the method's own arithmetic, by columns of `runs`."""
         asked_for = sum(self.seconds[kind] for kind in KINDS)
         return {
             **{column: self.counts[kind] for column, kind in COUNTED_BESIDES.items()},
@@ -76,20 +76,20 @@ class Ledger:
         }
 
     def copy(self) -> Ledger:
-        """The books as they are now."""
+        """A copy, which later entries do not change."""
         return Ledger(self.clock, self.counts.copy(), self.seconds.copy())
 
     def since(self, before: Ledger) -> Ledger:
-        """What has been entered since `before`, a copy of these books, was made."""
+        """A ledger of what has been entered since `before`, a copy of this ledger, was made."""
         spent = self.copy()
         spent.counts.subtract(before.counts)
         spent.seconds.subtract(before.seconds)
         return spent
 
     def counted(self) -> dict[str, int]:
-        """How often each kind of work was done, by the names of columns."""
+        """How often each kind of work was done, by columns of `runs`."""
         return {column: self.counts[kind] for column, kind in (COUNTED | COUNTED_BESIDES).items()}
 
     def timed(self) -> dict[str, float]:
-        """Seconds by kind of work, "own" for what a method did by itself; together the seconds inside the method."""
+        """Seconds by kind of work, "own" for the method's own arithmetic; their sum is the time spent in the method."""
         return {kind: self.seconds[kind] for kind in KINDS} | {"own": self.details()["seconds_own"]}

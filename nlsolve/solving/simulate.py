@@ -1,4 +1,4 @@
-"""One case from its components to its record: the problems of its scene's simulation, solved under the driver."""
+"""One case from its components to its record: the driver solves the problems of its simulation."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from nlsolve.solving.tangent import Tangent
 
 
 class Method(Protocol):
-    """The components of every case: what solves its problems, and when that stops."""
+    """The components that every case has: linear solver, solver, refresh rule, stopping test and budget."""
 
     @property
     def linear(self) -> LinearSolver: ...
@@ -44,7 +44,11 @@ class Method(Protocol):
 
 @dataclass(frozen=True)
 class Progress:
-    """What a listener is told after every increment."""
+    """How far a case is; given to a listener after each solve by the method of the case.
+
+    increment, increments : number of the last increment, and of all increments; a steady state has one.
+    tangents, factorizations : tangents K* and matrices factorised so far.
+    """
 
     increment: int
     increments: int
@@ -54,10 +58,14 @@ class Progress:
 
 @dataclass(frozen=True)
 class Record:
-    """What one case leaves: its row of `runs`, its rows of `steps`, its `fields` (a row a node and recorded time).
+    """The results of one case.
 
-    outcome : how the case ended; of a single solve, all there is to say of it.
-    problem, state : the last that was solved, None before the first; for measuring what work on them costs.
+    summary : its row of `runs`.
+    outcome : how the case ended; in a case of one solve, the outcome of that solve.
+    steps : its rows of `steps`.
+    fields : its rows of `fields`, one for each node and recorded time.
+    problem, state : the problem solved last and its solution (U,), on which the cost of work can be timed; None when
+        no problem was solved.
     """
 
     summary: dict[str, Any]
@@ -74,7 +82,11 @@ def run_case(
     clock: Callable[[], float] = time.process_time,
     watch: Callable[[Simulation], None] | None = None,
 ) -> Record:
-    """Run the case of these components, by the names of their sections, `scene` among them; see `simulate`."""
+    """Run one case.
+
+    parts : has the component of each section as an attribute of that name.
+    listen, clock, watch : see `simulate`.
+    """
     return simulate(lambda entry: parts.scene.simulation(parts, entry), parts, listen, clock, watch)
 
 
@@ -86,19 +98,19 @@ def simulate(
     clock: Callable[[], float] = time.process_time,
     watch: Callable[[Simulation], None] | None = None,
 ) -> Record:
-    """Solve the problems of a simulation; every ending, failure included, is in the record.
+    """Solve the problems of a simulation. A solve that fails becomes the status of the record, not an error.
 
-    build : makes the simulation, whose work outside the method is entered in the books it is handed.
-    listen : is told how far the case is after every problem its method has solved.
-    clock : what seconds are told by.
-    watch : is shown the simulation whenever it has kept a state.
+    build : makes the simulation from the ledger's `entry`, which times its work outside the method.
+    listen : called with a `Progress` after each solve by the method of the case.
+    clock : returns the seconds by which work is timed.
+    watch : called with the simulation whenever it has kept a state.
     """
     nothing: Callable[[Any], None] = lambda told: None  # noqa: E731
     return _Run(build, method, listen or nothing, clock, watch or nothing).record()
 
 
 class _Run:
-    """One case on its way: its simulation, the books of its own solves, and those of the way to the first state."""
+    """One case while it runs: its simulation, the ledger of its method, and that of the way to the first state."""
 
     def __init__(
         self,
@@ -123,13 +135,14 @@ class _Run:
         self.kept: tuple[NonlinearProblem, Array] | None = None
 
     def record(self) -> Record:
+        """Run the case."""
         outcome = self.outcome()
         summary = self.summary(outcome)
         problem, state = self.kept or (None, None)
         return Record(summary, outcome, steps_frame(self.rows), self.simulation.fields(), problem, state)
 
     def outcome(self) -> Outcome:
-        """Solve the problems of the simulation one after the other; how the case ended."""
+        """Solve the problems of the simulation one after another; returns the outcome of the case."""
         solves = self.simulation.solves()
         try:
             task = next(solves)
@@ -142,7 +155,7 @@ class _Run:
             return Outcome(error.status, error.detail, np.zeros(0), np.nan, ())
 
     def prepared(self, task: Solve) -> Outcome:
-        """A solve on the way to the first state, whose work is counted apart."""
+        """Solve a problem on the way to the first state; its work is counted apart."""
         assert task.preparation is not None
         stop = StoppingTest(kind="residual", tolerance=task.preparation.tolerance)
         budget = Budget(iterations=task.preparation.iterations)
@@ -156,9 +169,9 @@ class _Run:
         return outcome
 
     def solved(self, task: Solve) -> Outcome:
-        """The case's own method on one problem; its rows, counts and largest residual are kept."""
+        """Solve a problem by the method of the case; its rows, counts and largest residual are kept."""
         method, k = self.method, task.increment
-        if not self.tangent.renewals:  # in the ordering that the way to the first state settled on
+        if not self.tangent.renewals:  # reuses the ordering of the way to the first state
             self.tangent = Tangent(method.linear, method.refresh, self.ledger, self.start_tangent.factors)
         outcome = solve(task.problem, method.solver, self.tangent, task.start, method.stop, method.budget, self.ledger)
         self.iterations += outcome.iterations
@@ -168,7 +181,7 @@ class _Run:
         self.rows += [{"increment": k, "time": task.time, "accepted": False, **row} for row in outcome.rows]
         if self.validity_time is None and self.simulation.increments and self.tangent.renewals > 1:
             self.validity_time = self.time
-        before = self.residual_norm if k else np.nan  # of a steady state the last solve counts: a start may repeat it
+        before = self.residual_norm if k else np.nan  # a steady state may be solved again: its last solve counts
         self.residual_norm = float(np.fmax(before, outcome.residual_norm))
         if outcome.status is Status.CONVERGED:
             self.increments, self.time = max(k, 1), task.time
@@ -184,14 +197,14 @@ class _Run:
         return outcome
 
     def keep(self, task: Solve, outcome: Outcome) -> Mapping[str, float]:
-        """A state that solves its problem; returns columns of its last step."""
+        """Keep a state that solves its problem; returns columns of `steps` for its last step."""
         self.kept = task.problem, outcome.state
         columns = self.simulation.keep(task, outcome.state)
         self.watch(self.simulation)
         return columns
 
     def summary(self, outcome: Outcome) -> dict[str, Any]:
-        """The row of the case; what the simulation measures is of the last state that was kept."""
+        """The row of `runs`; the simulation measures its columns on the last state that was kept."""
         ledger, start = self.ledger, self.start_ledger
         place = self.simulation.place(self.blame)
         validity = self.validity_time
@@ -225,13 +238,13 @@ class _Run:
 
 
 def crashed(error: Exception) -> dict[str, Any]:
-    """The row of a case that ended in an error of the program or of a plugin: what it said, and where."""
+    """The row of `runs` for a case that an error of the program or of a plugin has ended: its message and its place."""
     place = traceback.extract_tb(error.__traceback__)[-1]
     message = f"{type(error).__name__}: {error} ({place.filename}:{place.lineno})"
     return {"status": Status.CRASHED.word, "message": message}
 
 
 def reported(rows: Sequence[Mapping[str, Any]]) -> dict[str, float | None]:
-    """What the method's library says it did, over all rows of `steps`; None where it says nothing."""
+    """Sums over `rows` of the work that the method's library reports itself; None for what it does not report."""
     said = {name: [row[name] for row in rows if name in row] for name in REPORTED}
     return {name: sum(numbers) if numbers else None for name, numbers in said.items()}

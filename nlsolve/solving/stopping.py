@@ -1,4 +1,4 @@
-"""When is a problem solved, and what may it cost? The test outside all methods, and the budget."""
+"""When is a problem solved, and what may it cost? The stopping test, which is outside all methods, and the budget."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ from nlsolve.series import Array
 class StoppingTest(Component):
     """When is an increment solved?
 
-    residual : ‖R(u)‖₂ / scale ≤ tolerance, the residual asked for by the driver, off the clock. The fair test.
+    residual : ‖R(u)‖₂ / scale ≤ tolerance, R(u) evaluated by the driver and not timed. The fair test.
     difference : ‖u_i − u_{i−1}‖ / ‖u_i‖ ≤ tolerance in the named norm, the test of iterative "Algo2" in the 2015 paper.
-    claim : the method says so itself (a_max ≥ 1 for a series, with its own η), as for "Algo1" in the 2015 paper.
+    claim : the method reports a solution (a_max ≥ 1 for a series, with its own η), as for "Algo1" in the 2015 paper.
     """
 
     noun: ClassVar[str] = "stop"
@@ -31,17 +31,19 @@ class StoppingTest(Component):
 
     @property
     def verified(self) -> float:
-        """The relative residual up to which a state is held to be a solution, whatever the method says of it."""
+        """The relative residual up to which a state counts as a solution, whatever the method reports of it."""
         return self.tolerance if self.kind == "residual" else VERIFIED
 
     def met(self, step: Step, residual_norm: float, difference: float) -> bool:
-        """Is this step a solution?"""
+        """Whether a step passes, with its relative residual and its relative difference from the step before."""
         if self.kind == "claim":
             return bool(step.claim)
         return (residual_norm if self.kind == "residual" else difference) <= self.tolerance
 
     def difference(self, state: Array, before: Array) -> float:
-        """‖u_i − u_{i−1}‖ / ‖u_i‖ in the test's norm; for "components" the larger of the two ratios."""
+        """‖u_i − u_{i−1}‖ / ‖u_i‖ in the test's norm, u_i = `state` and u_{i−1} = `before` (U,);
+        for "components" the larger of the two ratios.
+        """
         if self.norm == "components":
             pairs = [(state[i::2], before[i::2]) for i in (0, 1)]
             return max(_relative(u - w, u, 2) for u, w in pairs)

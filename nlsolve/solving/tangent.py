@@ -1,4 +1,4 @@
-"""K*: a factorised tangent, kept until a refresh rule asks for a new one. It outlives the increment it was made in."""
+"""The tangent K*, kept until a refresh rule asks for a new one; it may serve many increments."""
 
 from __future__ import annotations
 
@@ -16,16 +16,16 @@ from nlsolve.series import Array
 from nlsolve.solving.counted_matrix import CountedMatrix, counted, plain
 from nlsolve.solving.ledger import Ledger
 
-SMALLEST = 1e-16  # contraction by which digits are counted: beyond it lies rounding
-RECENT = 10.0  # solves whose digits weigh most in their recent rate
+SMALLEST = 1e-16  # a smaller contraction is rounding, and counts as this one
+RECENT = 10.0  # solves after which an earlier rate weighs 1/e
 
 
 class Tangent(KeptTangent):
-    """The kept tangent of one march: its factors, its history and its refresh rule.
+    """The tangent K* of one case: its factors, its history and its refresh rule.
 
-    rule : None renews K* at every iteration.
-    pattern : factors of a like matrix, which may lend their ordering.
-    renewals : how often K* has been factorised.
+    rule : when K* is renewed; None: at every iteration.
+    pattern : factors of a matrix with a similar pattern, whose ordering may be used again.
+    renewals : how often K* has been renewed.
     """
 
     def __init__(
@@ -40,7 +40,7 @@ class Tangent(KeptTangent):
         self._told = False  # whether the method has reported a contraction since the last step, with this K*
 
     def refresh_if_due(self, assemble: Callable[[], Any]) -> bool:
-        """See `KeptTangent`; factorisations are entered in the ledger."""
+        """See `KeptTangent`; the factorisation is entered in the ledger."""
         due = self.factors is None or self._rule is None or self._rule.due(self.history)
         if due:
             self._matrix = counted(assemble(), self._ledger)
@@ -57,9 +57,10 @@ class Tangent(KeptTangent):
         return factors
 
     def solve(self, rhs: Array) -> Array:
-        """K*⁻¹ rhs and as many steps x += K*⁻¹ (rhs − K* x) as the linear solver is to be refined by.
+        """x = K*⁻¹ rhs, (U,), then `refinement` steps x += K*⁻¹ (rhs − K* x) as the linear solver declares.
 
-        Raises SolveError when the tangent or the right-hand side gives no finite answer.
+        Raises SolveError when the right-hand side (non-finite) or the answer (singular tangent) is not finite, and
+        TypeError when there is no K* yet.
         """
         if self.factors is None or self._matrix is None:
             raise TypeError("there is no tangent yet: call refresh_if_due before solve")
@@ -74,7 +75,7 @@ class Tangent(KeptTangent):
         return x
 
     def _solved(self, factors: Factors, rhs: Array) -> Array:
-        """One `solve` of the factors with everything that they say it took, also when it fails."""
+        """One `solve` of the factors. The solves and products that they report are counted, also when it fails."""
         with self._ledger.entry("triangular_solve"):
             try:
                 return factors.solve(rhs)
@@ -96,16 +97,16 @@ class Tangent(KeptTangent):
             self.history = replace(self.history, range=range)
 
     def step_taken(self, contraction: float | None) -> None:
-        """‖R_new‖/‖R_old‖ of a step as the driver measured it, unless the method itself has reported a contraction.
+        """Give the refresh rule the contraction of a step, unless the method has reported one itself.
 
-        contraction : None at the state a solve begins with.
+        contraction : ‖R_new‖/‖R_old‖ as the driver has measured it; None at the start of a solve.
         """
         if contraction is not None and not self._told:
             self.observe(contraction=contraction)
         self._told = False
 
     def facts(self) -> dict[str, Any]:
-        """What the last factors know of themselves, under the names of `nlsolve.results.columns.RUNS`."""
+        """Ordering, fill and condition of the last factors, under the names of `nlsolve.results.columns.RUNS`."""
         factors = self.factors
         return {
             "ordering": factors.ordering if factors else None,

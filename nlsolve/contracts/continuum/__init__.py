@@ -1,1 +1,1 @@
-"""The contracts of flows: what the material is, where it is and what moves it, and how it is discretised."""
+"""The contracts of flows: cloud, geometry, constitutive law, discretizer, and the terms of the balance of momentum."""

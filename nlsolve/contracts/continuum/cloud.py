@@ -1,4 +1,4 @@
-"""The nodes of a flow and the named groups of its boundary, and a closed solution at given points."""
+"""The nodes of a flow with the named groups of its boundary, and the closed solution of a flow at given points."""
 
 from __future__ import annotations
 
@@ -52,22 +52,22 @@ class Cloud:
 
     @cached_property
     def interior(self) -> Indices:
-        """Nodes whose velocity is unknown."""
+        """Indices of the nodes whose velocity is unknown, shape (F,)."""
         return np.flatnonzero(~self.on_boundary)
 
     @cached_property
     def boundary(self) -> Indices:
-        """Nodes whose velocity is prescribed."""
+        """Indices of the nodes whose velocity is prescribed, shape (N − F,)."""
         return np.flatnonzero(self.on_boundary)
 
     def moved_to(self, nodes: Array) -> Cloud:
-        """The same groups at other places."""
+        """A cloud with the same groups and other places `nodes` (N, 2) [mm]. Raises SolveError (bad cloud)."""
         return replace(self, nodes=nodes)
 
 
 @dataclass(frozen=True)
 class Exact:
-    """A closed solution: velocity (N, 2) at points (N, 2), and named quantities such as the torque."""
+    """A closed solution: velocity (N, 2) [mm/s] at points (N, 2), and named quantities such as the torque."""
 
     velocity: Array
     quantities: Mapping[str, float] = field(default_factory=dict)

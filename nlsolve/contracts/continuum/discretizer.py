@@ -35,8 +35,8 @@ class PointOperators:
 
     rate : B, values at the nodes -> rates at the points, sparse (c P, 2N).
     force : S, stresses there -> force at the interior nodes, sparse (2F, c P).
-    points : where they are, (P, 2) [mm].
-    areas : A, of the points of a conservative form, (P,) [mm²]; None of a strong one.
+    points : places of the points, (P, 2) [mm].
+    areas : A, areas of the points in a conservative form, (P,) [mm²]; None in a strong form.
     """
 
     rate: Any
@@ -46,13 +46,13 @@ class PointOperators:
 
     @classmethod
     def conservative(cls, cloud: Cloud, rate: Any, points: Array, areas: Array) -> PointOperators:
-        """S = −Bᵀ A at the interior nodes."""
+        """The pair of a conservative form: B = `rate`, S = −Bᵀ A at the interior nodes."""
         free = np.stack([2 * cloud.interior, 2 * cloud.interior + 1], axis=1).ravel()
         weighed = sp.diags_array(_weights(areas, rate.shape[0] // len(points)))
         return cls(rate, (-(rate[:, free].T @ weighed)).tocsr(), points, areas)
 
     def weights(self) -> Array:
-        """The diagonal of A, (c P,), xy counted twice; of a conservative form only."""
+        """The diagonal of A, (c P,) [mm²], xy counted twice; in a conservative form only."""
         assert self.areas is not None
         return _weights(self.areas, self.rate.shape[0] // len(self.points))
 
@@ -67,8 +67,8 @@ class Operators:
 
     strain : B and S, at M points.
     volumetric : B_θ and S_θ, at L points; None when no volumetric term was asked for.
-    node_areas : W of a conservative form, (F,) [mm²]; None of a strong one.
-    neighbours : what the discretizer found on the cloud and may keep while nodes move; nobody else looks at it.
+    node_areas : W of a conservative form, (F,) [mm²]; None in a strong form.
+    neighbours : what the discretizer found on the cloud and can use again in `moved`; nothing else reads it.
     """
 
     strain: PointOperators
@@ -87,12 +87,12 @@ class Operators:
 
 
 class Discretizer(Component, ABC):
-    """Turns a cloud into operators."""
+    """Builds the operators of a cloud."""
 
     noun: ClassVar[str] = "discretizer"
     default_error_estimator: ClassVar[Mapping[str, Any] | None] = None
-    """The discretizer that estimates the error of this one's solutions when a study names none: one of another kind,
-    whose errors are not the same; None: no estimate.
+    """Table of the discretizer that estimates the error of this one's solutions when a study names none. It is of
+    another kind, so that its errors differ. None: no estimate.
     """
 
     @abstractmethod
@@ -100,19 +100,20 @@ class Discretizer(Component, ABC):
         """B, S and, when `volumetric`, B_θ, S_θ. Raises SolveError (bad cloud) naming the place where supports fail."""
 
     def moved(self, operators: Operators, cloud: Cloud) -> Operators | None:
-        """The operators of a cloud whose nodes have moved a little, with the `neighbours` found before; None when they
-        serve no more. Asked only of operators that carry some; a class that overrides `operators` overrides both.
+        """The operators of a cloud whose nodes have moved a little, made with the `neighbours` found before; None when
+        these no longer fit. Called only with `operators` that have neighbours. A class that overrides `operators` must
+        override `moved` too.
         """
         return None
 
     @abstractmethod
     def gradient(self, cloud: Cloud) -> tuple[Any, Any]:
-        """Sparse (N, N) matrices of ∂/∂x and ∂/∂y at the nodes, for what is not a stress: convection, measures."""
+        """Sparse (N, N) matrices of ∂/∂x and ∂/∂y at the nodes, used for convection and for measured columns."""
 
     @abstractmethod
     def values(self, sources: Array, targets: Array) -> Any:
         """Sparse (T, N) matrix taking values at `sources` (N, 2) to values at `targets` (T, 2)."""
 
     def diagnostics(self, cloud: Cloud) -> list[dict[str, Any]]:
-        """How good the operators of a cloud are, a row an operator (columns `DIAGNOSTICS`)."""
+        """One row for each operator of a cloud on its quality (columns `DIAGNOSTICS`); empty: nothing to report."""
         return []

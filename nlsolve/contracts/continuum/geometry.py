@@ -16,10 +16,10 @@ class Geometry(Component, ABC):
     """Geometry and boundary of a flow."""
 
     keeps_nodes: ClassVar[str | None] = None
-    """Why nodes must stay where they are, "material leaves the channel"; None where they may move with the material."""
+    """Why nodes must stay where they are, such as "material leaves the channel"; None when they may move."""
     moving_wall: ClassVar[str | None] = None
-    """The boundary group within the contour; a conservative form takes force and torque from its nodes. None: every
-    form takes them through the contour.
+    """Name of the boundary group inside the contour. A conservative form computes force and torque at its nodes, a
+    strong form on the contour. None: every form computes them on the contour.
     """
 
     @property
@@ -29,7 +29,7 @@ class Geometry(Component, ABC):
 
     @abstractmethod
     def cloud(self, law: ConstitutiveLaw) -> Cloud:
-        """The nodes at t = 0; they may be graded to the layers this law makes."""
+        """The nodes at t = 0. Their spacing may follow the layers that this law makes."""
 
     @abstractmethod
     def boundary_position(self, cloud: Cloud, time: float) -> Array:
@@ -40,13 +40,13 @@ class Geometry(Component, ABC):
         """V on the boundary nodes of the (current) `cloud`, shape (len(cloud.boundary), 2) [mm/s]."""
 
     def body_force(self, points: Array, law: ConstitutiveLaw, physics: Physics) -> Array | None:
-        """f at points (N, 2) [N/mm³], or None."""
+        """f at `points` (N, 2), shape (N, 2) [N/mm³]; None when no body force acts."""
         return None
 
     def exact(self, law: ConstitutiveLaw, points: Array, time: float) -> Exact | None:
-        """The closed quasi-static solution for this law, or None where there is none."""
+        """The closed quasi-static solution for this law at `points` (N, 2) [mm]; None when there is none."""
         return None
 
     def contour(self, motion: NodeMotion) -> Array | None:
-        """A closed polygon (C, 2) around the moving wall, in the material, for force and torque; None without one."""
+        """A closed polygon (C, 2) [mm] around the moving wall, in the material, for force and torque; or None."""
         return None

@@ -37,7 +37,7 @@ class ConstitutiveLaw(Component, ABC):
 
     noun: ClassVar[str] = "law"
     continued_by: ClassVar[Mapping[str, Literal["larger", "smaller"]]] = {}
-    """The fields in which the law can be made easier to solve, and which of their values are the easier ones."""
+    """The fields by which the law is continued, and whether larger or smaller values of them are easier to solve."""
 
     @abstractmethod
     def viscosity(self, rate_squared: Number) -> Number:
@@ -49,13 +49,15 @@ class ConstitutiveLaw(Component, ABC):
 
     @property
     def regularization_rate(self) -> float | None:
-        """ε₀ [1/s], the strain rate below which the viscosity is the regularization's own; None without one."""
+        """ε₀ [1/s], the strain rate below which the regularization sets the viscosity; None without one."""
         return None
 
     def continuation(self, by: str, values: tuple[float, ...]) -> list[ConstitutiveLaw]:
         """Easier laws to pass through on the way to this one, in order, ending with this one itself.
 
-        `by` names the field that is varied. Raises ValueError when the law is not continued by it.
+        by : name of the field that is varied.
+        values : values of that field, in order; those that are not easier than the law's own value are skipped.
+        Raises ValueError when the law is not continued by this field.
         """
         if by not in self.continued_by:
             fields = f"{', '.join(self.continued_by)} only" if self.continued_by else "none of its fields"

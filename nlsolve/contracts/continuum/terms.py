@@ -1,4 +1,4 @@
-"""Which terms the balance of momentum has, how time passes, how nodes move, and what is recorded: sections of a flow.
+"""Sections of a flow: the terms of the balance of momentum, the time steps, the motion of nodes, and the recording.
 
     ρ (∂V/∂t + (V·∇) V) = div σ + f,     σ = (λ tr(ε̇) − p) I + S(ε̇)
 

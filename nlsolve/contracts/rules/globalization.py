@@ -15,7 +15,7 @@ from nlsolve.series import Array
 
 
 class Search(Protocol):
-    """The step lengths of one solve; it may remember the steps before."""
+    """Finds the step lengths of one solve; it may remember the earlier steps."""
 
     def length(
         self,
@@ -25,18 +25,18 @@ class Search(Protocol):
         direction: Array,
         predicted_decrease: float = 1.0,
     ) -> tuple[float, Array]:
-        """Step length t > 0 and R(state + t direction), (U,).
+        """Step length t > 0 and R(state + t direction), (U,); `residual` is R(state), (U,).
 
-        predicted_decrease : the part of ‖R‖ that a full step would take away if R were linear: 1 of Newton's direction,
-        1 − η of an inexact one with ‖R + J w‖ = η ‖R‖.
+        predicted_decrease : the part of ‖R‖ that a full step would take away if R were linear: 1 for Newton's
+            direction, 1 − η for an inexact one with ‖R + J w‖ = η ‖R‖.
         """
 
 
 class Globalization(Component, ABC):
-    """How a method that proposes directions is kept from going too far along them."""
+    """Limits how far a method goes along the directions that it proposes."""
 
     noun: ClassVar[str] = "globalization"
 
     @abstractmethod
     def search(self, problem: NonlinearProblem) -> Search:
-        """The search of one solve. SolveError (not applicable) where the problem gives it nothing to search on."""
+        """The search of one solve. Raises SolveError (not applicable) when the problem lacks what the search needs."""

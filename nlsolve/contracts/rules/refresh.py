@@ -1,4 +1,4 @@
-"""When is K* factorised anew? The contract of refresh rules, and what they may look at."""
+"""When is K* factorised anew? The contract of refresh rules, and the history of K* that they are given."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ class TangentHistory:
 
     uses : iterations or series that K* has served.
     contraction : ‖R‖ after the last step over ‖R‖ before it, which the driver measures after every step. A method that
-        takes several solves in a step reports the contraction per solve instead.
+        needs several solves for a step reports the contraction per solve instead.
     range : a_max of the last series computed with K*.
     solves : right-hand sides solved with K*.
     digits : decimal digits by which the residual has fallen with K*, Σ lg(1/contraction) over its solves.
