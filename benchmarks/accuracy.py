@@ -2,10 +2,10 @@
 
     python benchmarks/accuracy.py
 
-Prints observed orders between clouds whose spacings are all scaled by s, the nodes that small errors of the spin take
-at small n, the errors of every law where there is an exact solution, those of torque and force of the journal bearing,
-and for the orbit the largest difference from the reference (tests/reference) off the walls, in parts of the
-tool speed, and the difference in drag.
+Prints, one after the other: observed orders between clouds whose spacings are all scaled by s; how many nodes small
+errors of the spin need at small n; the errors of every law where there is an exact solution; the errors of torque and
+force of the journal bearing; and for the orbit the largest difference from the reference (tests/reference) off the
+walls, in parts of the tool speed, and the difference in drag.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ import pandas as pd
 import nlsolve
 
 REFERENCE = Path(__file__).parent.parent / "tests" / "reference"
-DRAG = {1.0: -205426.58, 0.3: -12224.03}  # N/mm
+DRAG = {1.0: -205426.58, 0.3: -12224.03}  # of the reference, by n [N/mm]
 TOOL_SPEED = 150.0  # mm/s
 
 
@@ -31,7 +31,7 @@ def steady(
     law: dict[str, Any] | None = None,
     **sections: Any,
 ) -> nlsolve.Results:
-    """One steady state by Newton's method."""
+    """The results of one steady state by Newton's method."""
     return nlsolve.run(
         {
             "question": "how accurate is this steady state?",
@@ -45,7 +45,7 @@ def steady(
 
 
 def orders() -> None:
-    """Graded rings with h(r) = s min(0.1 + 0.12 (r − r_t), 0.25) mm; the order is that of the mean spacing N^(−1/2)."""
+    """Print orders for graded rings with h(r) = s min(0.1 + 0.12 (r − r_t), 0.25) mm, in the mean spacing N^(−1/2)."""
     for index in (1.0, 0.3):
         print(f"\nsteady spin, n = {index}:       s    nodes   velocity error   order")
         before: tuple[int, float] | None = None
@@ -70,7 +70,7 @@ def spin(kind: str, index: float) -> pd.Series:
 
 
 def spins() -> None:
-    """Print how many nodes small errors take."""
+    """Print how many nodes small errors of the steady spin need."""
     print("\nsteady spin:     n   nodes   smallest spacing   velocity error   inside     torque error   seconds")
     for kind, index in RESOLUTION:
         run = spin(kind, index)
@@ -135,7 +135,7 @@ def bearing(name: str, spacing: float) -> pd.Series:
 
 
 def bearings() -> None:
-    """Print the errors of velocity, torque and force."""
+    """Print the errors of velocity, torque and force of the bearing."""
     print("\nbearing:           spacing   nodes   velocity error   torque error   force error   pressures   seconds")
     for name in BEARING:
         for spacing in (0.2, 0.1, FEW[name]):
@@ -173,7 +173,7 @@ def orbit_against_reference(index: float) -> Comparison:
 
 
 def orbit() -> None:
-    """Print the comparison at both indices."""
+    """Print the comparison of the orbit with the reference at both n."""
     for index, drag in DRAG.items():
         ours = orbit_against_reference(index)
         print(

@@ -3,7 +3,7 @@
     python benchmarks/agreement.py
 
 Marches the first study's scene (the 2015 paper's 1780 nodes, which move) with each method, records all nodes at every
-increment, and prints the largest difference of any velocity component from Newton's solved to 1e-10.
+increment, and prints the largest difference of any velocity component from that of Newton's method stopped at 1e-10.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ STRATEGIES: dict[str, dict[str, Any]] = {
 
 
 def velocities(strategy: dict[str, Any]) -> np.ndarray:
-    """Velocities (K, N, 2) at all recorded increments."""
+    """Velocities (K, N, 2) [mm/s] at all increments, under one strategy."""
     first = Study.from_toml(FIRST).cases[0].parts
     increment = first.time.increment
     document = {

@@ -3,9 +3,9 @@
     python benchmarks/linear.py [--large] [repeats]
 
 Prints, for every form of the discretisation on the 2015 paper's 1780 nodes (--large: also on 4854 and on 19133), a row
-a linear solver: processor time [ms] of the first factorisation; the median of a later one, to which the first lends its
-ordering or analysis, and of one solve; both over SuperLU's in the same run; the pairs of triangular solves in a solve;
-entries of the factors; ‖b − A x‖/‖b‖. A linear solver whose library is absent is left out, and named.
+for each linear solver: processor time [ms] of the first factorisation; the median of a later one, to which the first
+lends its ordering or analysis, and of one solve; both over SuperLU's in the same run; the pairs of triangular solves in
+a solve; entries of the factors; ‖b − A x‖/‖b‖. A linear solver whose library is absent is left out, and named.
 """
 
 from __future__ import annotations
@@ -46,9 +46,9 @@ OUT_OF = ["factor", "solve"]
 
 
 def tangents(form: dict[str, Any], spacing: float) -> tuple[Any, Any]:
-    """J at two states one part in a thousand from the exact steady spin: a tangent of a march and a later one.
+    """J at two states a thousandth away from the exact steady spin, as two tangents of one march.
 
-    Not at the exact spin itself, where entries cancel that are there in every march.
+    Not at the exact spin itself: there some entries are zero that are not zero in a march.
     """
     case = setup(nodes={"kind": "rings", "spacing": spacing}, **form)
     cloud = case.scene.cloud(case.law)
@@ -62,7 +62,7 @@ def tangents(form: dict[str, Any], spacing: float) -> tuple[Any, Any]:
 
 
 def processor_time(work: Callable[[], Any], repeats: int) -> tuple[Any, float]:
-    """Result, and median milliseconds of all threads over `repeats` runs; other programs hardly count."""
+    """The result of `work`, and its median processor time over `repeats` runs [ms], of all threads."""
     spent = []
     for _ in range(repeats):
         begun = time.process_time()
@@ -72,7 +72,7 @@ def processor_time(work: Callable[[], Any], repeats: int) -> tuple[Any, float]:
 
 
 def row(linear: nlsolve.LinearSolver, first: Any, following: Any, repeats: int) -> dict[str, Any]:
-    """What one linear solver costs on two matrices of one march; why not, where it fails."""
+    """What one linear solver costs on two matrices of one march; where it fails, the sentence that says why."""
     rhs = following @ np.random.default_rng(0).standard_normal(following.shape[0])
     try:
         lent, alone = processor_time(lambda: linear.factorize(first), 1)
@@ -92,7 +92,7 @@ def row(linear: nlsolve.LinearSolver, first: Any, following: Any, repeats: int) 
 
 
 def measure(spacing: float, repeats: int) -> pd.DataFrame:
-    """A row a form and linear solver; milliseconds."""
+    """One row for each form and linear solver; times in milliseconds."""
     classes, rows = load_registry().classes("linear"), []
     for form, fields in FORMS.items():
         first, following = tangents(fields, spacing)
@@ -111,7 +111,7 @@ def measure(spacing: float, repeats: int) -> pd.DataFrame:
 
 
 def main(arguments: list[str]) -> None:
-    """Print one table a size."""
+    """Print one table for each spacing."""
     size = "large" if "--large" in arguments else "small"
     numbers = [int(argument) for argument in arguments if argument.isdigit()]
     for kind in sorted({chosen["kind"] for chosen in LINEARS.values()}):

@@ -34,7 +34,7 @@ SCALES = (1.05, 0.6, 0.35, 0.22, 0.143)  # of all spacings: 2 000 to 100 000 nod
 
 
 def setup(kind: str, nodes: dict[str, Any], **fields: Any) -> Any:
-    """The steady spin with one discretizer."""
+    """The components of the steady spin with one discretizer."""
     study = {
         "question": "what do operators cost?",
         "scene": {"kind": "stirring-tool", "nodes": nodes},
@@ -54,7 +54,7 @@ def preparation(discretizer: Any, cloud: nlsolve.Cloud) -> None:
 
 
 def growth(repeats: int) -> None:
-    """Seconds against nodes."""
+    """Print seconds of the operators against the number of nodes."""
     for kind in KINDS:
         counts, seconds = [], []
         print(f"\n{kind:9s}  nodes    seconds   µs a node   of it triangulation and search")
@@ -72,7 +72,7 @@ def growth(repeats: int) -> None:
 
 
 def against_factorization(repeats: int) -> None:
-    """Operators of the paper's cloud over one factorisation of the tangent they make."""
+    """Print the time of operators on the paper's cloud over that of one factorisation of their tangent."""
     print("\n1780 nodes:                     operators   factorisation   ratio")
     for kind in KINDS:
         for form in ("strong", "conservative") if kind != "delaunay" else ("",):
@@ -89,13 +89,13 @@ def against_factorization(repeats: int) -> None:
 
 
 def derivatives(discretizer: Collocation, nodes: np.ndarray, points: np.ndarray) -> Any:
-    """∂/∂x and ∂/∂y as sparse matrices."""
+    """∂/∂x and ∂/∂y at `points` (T, 2) from `nodes` (N, 2) [mm], sparse (T, N) each."""
     supports, (dx, dy) = discretizer.weights(nodes, points, "value", GRADIENT)
     return Gradient(supports.index, dx, dy).matrices(len(nodes))
 
 
 def against_another_library(repeats: int) -> None:
-    """∂/∂x and ∂/∂y at the same points from the same nodes: sparse matrices on either side."""
+    """Print the time of ∂/∂x and ∂/∂y at the same points from the same nodes, as sparse matrices of either library."""
     if weight_matrix is None:
         print("\nThe library rbf is not installed (pip install treverhines-rbf): nothing to compare with.")
         return

@@ -3,7 +3,7 @@
     python benchmarks/orders.py
 
 Prints, for nodes of a jittered grid and for scattered ones, and for n = 1 and 0.5, the relative ℓ² error of the inner
-nodes' velocities at each spacing, and the order of N^(−1/2) between it and the one before.
+nodes' velocities at each spacing, and the order in N^(−1/2) between this spacing and the one before.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ SPACINGS = (0.1, 0.0667, 0.05, 0.025)
 def errors(
     discretizer: dict[str, Any], nodes: dict[str, Any], index: float, spacings: Sequence[float]
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Number of nodes and error at each spacing."""
+    """Number of nodes and error at each spacing. Raises RuntimeError for a case that does not converge."""
     counts, found = [], []
     for spacing in spacings:
         study = {
@@ -62,7 +62,7 @@ def orders(counts: np.ndarray, found: np.ndarray) -> np.ndarray:
 
 
 def table() -> None:
-    """Print all of them."""
+    """Print errors and orders of all discretizers."""
     for name, nodes in NODES.items():
         for index in (1.0, 0.5):
             print(f"\n{name}, n = {index}" + "".join(f"{h:>13.4g} mm" for h in SPACINGS))

@@ -4,10 +4,10 @@
 
 Solves, on the 2015 paper's 1780 nodes, the steady spin at n = 0.3 from its Newtonian state, and the first increments
 of the paper's march at n = 0.1324, by each strategy of nlsolve and by its equals in the libraries that are installed,
-under one ledger and one stopping test. All are run in turn, `rounds` times. Prints the counts, the median of the
-seconds in the method, of them those spent outside all counted work (the method's own), and the median over the rounds
-of our seconds over theirs. The seconds are the processor's: what else runs on the machine does not count. KINSOL's line
-search has no equal here, nor in SNES: where steps are cut its counts differ.
+under one ledger and one stopping test. All are run in turn, `rounds` times. Prints the counts; the median
+of the seconds in the method; the part of them outside all counted work (the method's own); and the median over the
+rounds of our seconds over theirs. Seconds are the processor's, so that other programs do not count. Neither nlsolve nor
+SNES has the line search of KINSOL: where steps are cut, its counts differ.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ def petsc(**settings: Any) -> dict[str, Any]:
 
 
 def kinsol(strategy: str, **settings: Any) -> dict[str, Any]:
-    """KINSOL, which wants K* set up at each iteration where nothing else is said."""
+    """KINSOL, by default with K* asked for at each iteration."""
     return {"solver": {"kind": "kinsol", "strategy": strategy, "setup_interval": 1, **settings}}
 
 
@@ -99,7 +99,7 @@ def solve(scene: dict[str, Any], strategy: dict[str, Any]) -> dict[str, Any]:
 
 
 def compare(name: str, scene: dict[str, Any], rounds: int) -> None:
-    """The table of one scene."""
+    """Print the table of one scene."""
     head = "".join(f"{word:>8s}" for word in ("factor", "solves", "resid", "jacob", "s", "own ms"))
     print(f"\n{name}\n{'':44s}{head}  ours/theirs")
     for strategy, peers in STRATEGIES.items():

@@ -24,7 +24,7 @@ MOVED = "operators of a moved cloud"
 
 
 def median_seconds(work: Callable[[], object], repeats: int) -> float:
-    """Median over `repeats` runs, after one that is not counted."""
+    """Median processor time over `repeats` runs [s], after one that is not counted."""
     work()
     seconds = []
     for _ in range(repeats):
@@ -35,7 +35,7 @@ def median_seconds(work: Callable[[], object], repeats: int) -> float:
 
 
 def measure(volume_points: str, repeats: int) -> None:
-    """All pieces of one increment of the paper's scene with one form of the volumetric term."""
+    """Print the time of each piece of one increment of the paper's scene, with one form of the volumetric term."""
     study = nlsolve.Study.from_dict(
         {
             "question": "what does a step cost?",

@@ -1,4 +1,4 @@
-"""What `nlsolve.solve` and `nlsolve.compare` are asked for, checked: a problem with its start, and a strategy."""
+"""The arguments of `nlsolve.solve` and `nlsolve.compare`, checked: a problem with its start, and a strategy."""
 
 from __future__ import annotations
 
@@ -25,17 +25,17 @@ from nlsolve.solving.stopping import Budget, StoppingTest
 from nlsolve.study.case import claims_missing
 
 Given = str | Mapping[str, Any] | Component
-"""A component by its kind, as a table with its kind and parameters, or as an instance, installed or not."""
+"""A component: its kind, a table of its kind and parameters, or an instance, installed or not."""
 
 Formula = Callable[[Any], Any]
 
 OUTSIDE = 1e-6
-"""Part of J w that a pattern may miss: rounding."""
+"""Largest part of J w that may lie outside a pattern; below it the difference is rounding."""
 
 
 @dataclass(frozen=True)
 class Posed:
-    """A problem and where its solution is sought; the system it came from, if any."""
+    """A problem and its start u_0, (U,); `system` is the System that the problem was given as, if any."""
 
     problem: NonlinearProblem
     start: Array
@@ -44,7 +44,7 @@ class Posed:
 
 @dataclass(frozen=True)
 class Strategy:
-    """What solves it, and when that stops."""
+    """The components that solve a problem, with the stopping test and the budget."""
 
     solver: NonlinearSolver
     linear: LinearSolver
@@ -59,7 +59,7 @@ def mistake(caller: str, place: str, value: object, expected: str) -> InputError
 
 
 def posed_problem(caller: str, problem: Any, start: Any, pattern: Any, jacobian: Any) -> Posed:
-    """The problem and its start. Raises InputError where one of them is none, or where they do not belong together."""
+    """The checked problem and start. Raises InputError if one of them cannot be used or they do not fit together."""
     if isinstance(problem, type):
         raise mistake(caller, "problem", problem, f"is a class: give an instance of it, such as {problem.__name__}(…)")
     if not isinstance(problem, System | NonlinearProblem):
@@ -82,7 +82,7 @@ def posed_problem(caller: str, problem: Any, start: Any, pattern: Any, jacobian:
 
 
 def _start(caller: str, start: Any) -> Array:
-    """u_0, (U,)."""
+    """u_0, (U,). Raises InputError unless `start` is a vector of finite real numbers."""
     if start is None:
         raise mistake(caller, "start", start, "should be real numbers, one for each unknown")
     try:
@@ -101,7 +101,7 @@ def _start(caller: str, start: Any) -> Array:
 
 
 def _check_residual(caller: str, residual: Formula, start: Array) -> None:
-    """F at the start is a (U,) array of numbers; whether these are finite is for the driver to tell."""
+    """Raises InputError unless F(start) is a (U,) array of numbers. The driver tells whether they are finite."""
     try:
         with np.errstate(all="ignore"):
             real(residual(start.copy()), start.shape, "F(start)")
@@ -124,12 +124,12 @@ def _of_formula(caller: str, formula: Formula, start: Array, pattern: Any, jacob
 
 
 def _check_pattern(caller: str, compressed: FormulaProblem, full: FormulaProblem, start: Array) -> None:
-    """J w by groups of columns is J w: no entry of the Jacobian at the start is outside the pattern."""
+    """J w by groups of columns is J w. Raises InputError if J at the start has an entry outside the pattern."""
     direction = np.random.default_rng(0).standard_normal((len(start), 1))
     with np.errstate(all="ignore"):
         try:
             product, by_groups = full.derivative(start, direction), compressed.jacobian(start) @ direction
-        except SolveError:  # no series runs through the formula: told where a method asks for one
+        except SolveError:  # not analytic: reported when a method asks for a derivative
             return
     missed = np.abs(product - by_groups)
     if (missed > OUTSIDE * np.abs(product).max()).any():
@@ -142,7 +142,7 @@ def _check_pattern(caller: str, compressed: FormulaProblem, full: FormulaProblem
 
 @cache
 def _model() -> type[BaseModel]:
-    """The parts of a strategy, as a study would have them."""
+    """The pydantic model of a strategy: the sections that a study has for it."""
     registry = load_registry()
     parts: dict[str, Any] = {noun: (registry.union(noun), ...) for noun in ("solver", "linear", "refresh")}
     parts |= {"stop": (StoppingTest, StoppingTest()), "budget": (Budget, Budget())}
@@ -150,7 +150,7 @@ def _model() -> type[BaseModel]:
 
 
 def strategy_of(caller: str, solver: Any, linear: Any, refresh: Any, stop: Any, budget: Any) -> Strategy:
-    """The components asked for. Raises InputError with a sentence for each that is wrong."""
+    """The strategy that the arguments describe. Raises InputError with a sentence for each wrong argument."""
     by_kind = {"solver": solver, "linear": linear, "refresh": refresh}
     document = {name: {"kind": value} if isinstance(value, str) else value for name, value in by_kind.items()}
     if refresh is None:

@@ -1,4 +1,4 @@
-"""How good are the operators that a study's discretizers make of its clouds? Told before anything is solved."""
+"""How good are the operators of a study's discretizers on its clouds? Answered before anything is solved."""
 
 from __future__ import annotations
 
@@ -16,14 +16,15 @@ NO_CLOUD = "this scene has no cloud, and no operators on it"
 
 
 def telling(name: str) -> bool:
-    """Is this a parameter of clouds or discretizers, or the name of a setting?"""
+    """Whether `name` is a parameter of the scene or the discretizer, or the column of settings' names."""
     return names_settings(name) or name.split(".")[0] in ("scene", "discretizer")
 
 
 def diagnose(study: Study) -> pd.DataFrame:
-    """A row an operator of every distinct cloud and discretizer: what tells the case apart, `nodes`, DIAGNOSTICS.
+    """One row for each operator of every distinct pair of cloud and discretizer.
 
-    A cloud or discretizer that refuses leaves a row whose `operator` is the sentence.
+    Columns: the swept parameters of scene and discretizer, `nodes`, and `DIAGNOSTICS`. Where a cloud or its operators
+    cannot be built, there is one row, whose `operator` is the sentence that says why.
     """
     seen: list[Any] = []
     rows: list[dict[str, Any]] = []

@@ -1,4 +1,4 @@
-"""What a study will do and about what it will cost, told from unit costs measured once for every scene in it."""
+"""What each case of a study will cost, from unit costs measured once for all cases that differ in method only."""
 
 from __future__ import annotations
 
@@ -14,16 +14,16 @@ from nlsolve.solving.ledger import Ledger
 from nlsolve.study.study import Study
 
 SOLVES = 20
-"""Pairs of triangular solves, and residuals, an increment is taken to need: about one series."""
+"""Pairs of triangular solves, and residuals, that the forecast assumes for an increment: about one series."""
 
 STAGE = 5
-"""Newton iterations taken for each law on the way to the first state."""
+"""Newton iterations that the forecast assumes for each law on the way to the first state."""
 
 ASSUMPTION = (
     f"forecast: {STAGE} Newton iterations for each law on the way to the first state, then one factorisation and "
     f"{SOLVES} pairs of triangular solves an increment"
 )
-"""Newton needs several factorisations an increment, a kept tangent far fewer than one."""
+"""Newton needs several factorisations an increment, a method that keeps K* far fewer than one."""
 
 INCREMENT = {"factorizations": 1, "jacobians": 1, "triangular_solves": SOLVES, "residuals": SOLVES}
 ITERATION = {"factorizations": 1, "jacobians": 1, "triangular_solves": 1, "residuals": 1}
@@ -37,14 +37,14 @@ SAMPLE = [
     "seconds_iteration",
     "seconds_increment",
 ]
-
+"""Columns that `costs_of` gives: sizes of a case and seconds [s] of its work."""
 
 METHOD = ("solver", "refresh", "predictor", "stop", "budget", "record")
 """Sections that do not change what a unit of work costs."""
 
 
 def forecast(study: Study) -> pd.DataFrame:
-    """A row a case: its swept parameters, its size, and the seconds it would take under the `ASSUMPTION`."""
+    """One row for each case: its swept parameters, its size, and its seconds [s] under the `ASSUMPTION`."""
     measured: dict[str, dict[str, Any]] = {}
     rows = []
     for case in study.cases:
@@ -67,7 +67,7 @@ def _identity(part: Component | None) -> str:
 
 
 def costs_of(parts: Any) -> dict[str, Any]:
-    """Sizes and timings [s] of one case at its sample; NaN where that is bad."""
+    """Sizes of one case, and seconds [s] of its work at the sample of its simulation; NaN if that cannot be solved."""
     found = calibrate(parts, rounds=1)
     sizes = {name: found.sizes.get(name) for name in ("nodes", "unknowns")}
     if found.unit is None:

@@ -20,7 +20,7 @@ from nlsolve.solving.simulate import Record, crashed, simulate
 from nlsolve.solving.stopping import Budget, StoppingTest
 
 OF_A_MARCH = ("increments", "seconds_operators", "seconds_all")
-"""Columns of `runs` that say nothing of a single solve."""
+"""Columns of `runs` that have no meaning for a single solve."""
 
 
 def solve(
@@ -35,18 +35,19 @@ def solve(
     pattern: Any | None = None,
     jacobian: Formula | None = None,
 ) -> Outcome:
-    """u with F(u) = 0, from `start` on.
+    """Solve F(u) = 0 from `start`.
 
     problem : F, a function of arrays (U,) -> (U,), whose Jacobian comes from the formula itself; or a `System`, or a
         `NonlinearProblem`.
-    start : u_0, (U,); a system has its own.
+    start : u_0, (U,); may be left out for a `System`, which has its own.
     solver, linear, refresh : by kind ("newton"), with parameters ({"kind": "anm", "order": 15}), or as instances;
-        without `refresh` the solver's own rule for renewing its tangent.
-    stop, budget : such as {"tolerance": 1e-10} and {"iterations": 50}.
-    pattern : of a function: where its Jacobian may differ from zero, sparse (U, U), so that it costs a few columns.
-    jacobian : of a function: u -> J(u), dense or sparse (U, U), for one that is not analytic.
+        without `refresh` the solver's default rule decides when K* is renewed.
+    stop, budget : stopping test and budget, such as {"tolerance": 1e-10} and {"iterations": 50}.
+    pattern : for a function: sparse (U, U), with an entry wherever J(u) may differ from zero; J(u) then costs a few
+        columns instead of U.
+    jacobian : for a function that is not analytic: u -> J(u), dense or sparse (U, U).
 
-    However the solve ends, the `Outcome` says so. Raises InputError for what cannot be asked for.
+    The `Outcome` says how the solve ended, a failure too. Raises InputError for arguments that cannot be used.
     """
     posed = posed_problem("nlsolve.solve", problem, start, pattern, jacobian)
     return _solved(posed, strategy_of("nlsolve.solve", solver, linear, refresh, stop, budget)).outcome
@@ -64,11 +65,13 @@ def compare(
     pattern: Any | None = None,
     jacobian: Formula | None = None,
 ) -> pd.DataFrame:
-    """The same problem from the same start under each of `solvers`: a row each, with the columns of `runs` that apply.
+    """Solve one problem from one start with each of `solvers`: one row for each, with the columns of `runs` that apply.
 
-    `solvers` is a list, or a dictionary that names them: {"full steps": {"kind": "newton", "globalization": …}}. The
-    first column, `solver`, holds the names. All else is as in `solve`. A method that fails, or crashes, is a row that
-    says so. Raises InputError for what cannot be asked for.
+    solvers : a list, or a dictionary that names them: {"full steps": {"kind": "newton", "globalization": …}}. The first
+        column, `solver`, holds the names.
+
+    The other arguments are those of `solve`. A method that fails, or crashes, gives a row that says so. Raises
+    InputError for arguments that cannot be used.
     """
     caller = "nlsolve.compare"
     posed = posed_problem(caller, problem, start, pattern, jacobian)
@@ -86,7 +89,7 @@ def compare(
 
 
 def _solved(posed: Posed, strategy: Strategy) -> Record:
-    """One solve with books of its own, a system held against its known roots."""
+    """One solve with its own ledger; the solution of a system is compared with the system's known roots."""
 
     def simulation(entry: Entry) -> Simulation:
         if posed.system is not None:
@@ -97,17 +100,17 @@ def _solved(posed: Posed, strategy: Strategy) -> Record:
 
 
 def _row(posed: Posed, strategy: Strategy) -> dict[str, Any]:
-    """The row of one strategy; whatever it raises becomes a row too, but for the caller's mistakes."""
+    """The row of one strategy. Every exception becomes a row too, except InputError, a mistake of the caller."""
     try:
         return _solved(posed, strategy).summary
     except InputError:
         raise
-    except Exception as error:  # as in a study: a method of one's own may raise anything
+    except Exception as error:  # as in a study: a stranger's method may raise anything
         return crashed(error)
 
 
 def _label(component: Component) -> str:
-    """The kind, and the parameters that were chosen: anm, order = 15."""
+    """The kind, and the given parameters that differ from their defaults: "anm, order = 15"."""
     words = [component.kind_name()]
     for name, field in type(component).model_fields.items():
         value = getattr(component, name)

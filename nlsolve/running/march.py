@@ -29,13 +29,14 @@ from nlsolve.study.study import Study
 
 @dataclass(frozen=True, eq=False)
 class March:
-    """A flow that has been marched, or the one state of a steady flow.
+    """The states of a flow at the ends of its increments, or the one state of a steady flow.
 
-    outcome : how it ended; a march that failed holds the increments before.
+    outcome : how the march ended; the states before a failure are kept.
     row : its row of `runs`.
-    steps : a row an iteration or series.
-    times : ends of the increments, the first state at t = 0 first, shape (K,) [s].
+    steps : one row for each iteration or series.
+    times : t = 0, the time of the first state, and the ends of the increments, shape (K,) [s].
     nodes, velocities : at these times, shape (K, N, 2) [mm], [mm/s].
+    parts : the validated component of each section of the case.
     """
 
     outcome: Outcome
@@ -49,8 +50,8 @@ class March:
     def velocity(self, points: ArrayLike, time: float) -> Array:
         """V at points (T, 2) [mm] and a time [s], shape (T, 2) [mm/s]; NaN outside the material.
 
-        In space by the discretizer, in time linear between the ends of the increments. Raises InputError for a time
-        that was not reached and for points of another shape.
+        The discretizer interpolates in space; in time V is linear between the ends of the increments. Raises
+        InputError for a time that was not reached and for points of another shape.
         """
         places = np.asarray(points, dtype=float)
         if places.ndim != 2 or places.shape[1] != 2:
@@ -63,7 +64,7 @@ class March:
         return np.sum([weight * self._at(k, places) for k, weight in ends if weight], axis=0)
 
     def fields(self, time: float) -> pd.DataFrame:
-        """A row a node at the end of the increment nearest to `time` [s], with the columns of `fields`.
+        """One row for each node at the end of the increment nearest to `time` [s], with the columns of `fields`.
 
         Raises InputError for a time that was not reached.
         """
@@ -81,7 +82,7 @@ class March:
         return time
 
     def _at(self, k: int, places: Array) -> Array:
-        """V(x, t_k); NaN farther from every node than markers may be."""
+        """V(x, t_k) at `places` (T, 2) [mm], (T, 2) [mm/s]; NaN where a marker would count as lost."""
         nodes = self.nodes[k]
         tree = cKDTree(nodes)
         distance, nearest = tree.query(places)
@@ -101,10 +102,9 @@ def march(
     """March the flow of a study with one case; nothing is written.
 
     study : as for `run`; a dictionary needs no question, and its sections may be instances.
-    listen : is told after every increment.
+    listen : is called with a `Progress` after every increment.
 
-    Raises StudyError for a study that cannot be run as it is written, or has several cases; InputError where its scene
-    is no flow.
+    Raises StudyError for a study that is not valid or has several cases, InputError for a scene that is no flow.
     """
     if isinstance(study, Mapping):
         study = {"question": "What does the flow look like?", **study}

@@ -1,4 +1,4 @@
-"""Study -> results: every case run once, under one thread, and every ending a row."""
+"""Study -> results: every case is run once, on one thread, and every ending becomes a row."""
 
 from __future__ import annotations
 
@@ -31,10 +31,11 @@ from nlsolve.study.timing import Timing
 
 @dataclass(frozen=True)
 class Event:
-    """What a listener is told: a case begins (no progress, no run), advances (progress), or has ended (its run).
+    """What a listener is told: a case begins (no `progress`, no `run`), advances (`progress`), or has ended (`run`).
 
-    number : of the case, from 1; where cases are timed in several rounds, of its turn among `cases` turns.
-    resumed : the run was read from the results folder instead of computed.
+    number, cases : which case this is, from 1, and how many there are; with several timing rounds every round counts.
+    run : the row of `runs` of the case.
+    resumed : whether that row was read from the results folder instead of computed.
     """
 
     case: Case
@@ -46,18 +47,18 @@ class Event:
 
 
 SECONDS_BETWEEN_FRAMES = 10.0
-"""The parts of finished cases are kept one by one; together they are written now and then, and at the end."""
+"""Least time between two writings of the merged frames [s]; the part of a case is saved as soon as the case ends."""
 
 Listener = Callable[[Event], None]
 
 
 @dataclass(frozen=True)
 class Results:
-    """What a study has found.
+    """The results of a study.
 
     runs, steps, fields : tidy frames; `nlsolve.results.columns` says what every column means.
-    folder : where they are kept; None in memory only.
-    notes : what could not be shown, and why, a sentence each.
+    folder : the results folder; None if the results are in memory only.
+    notes : one sentence for each table or figure that could not be shown, with the reason.
     """
 
     study: Study
@@ -77,7 +78,7 @@ class Results:
         return _tables(self.study, self.runs)[0]
 
     def table(self, name: str) -> pd.DataFrame:
-        """The cells of a declared table. Raises StudyError where none has this name."""
+        """The cells of a declared table. Raises StudyError if no table has this name or these runs cannot fill it."""
         for spec in self.study.tables:
             if spec.name == name:
                 return build(spec, self.runs).cells
@@ -95,11 +96,10 @@ def run(
 ) -> Results:
     """Run every case of a study that has not been run before, and keep the results in `out` (None: in memory).
 
-    An interruption loses the running case only; the same call again does the rest. Cases that crashed, or whose method
-    did not apply, are tried again. `listen` is told of each `Event`.
+    An interruption loses only the case that is running; the same call later runs the cases that are left. Cases that
+    crashed, or whose method did not apply, are run again. `listen` is called with each `Event`.
 
-    Raises StudyError for a study that cannot be run as it is written, StoreError for a folder that cannot hold its
-    results.
+    Raises StudyError for a study that is not valid, StoreError for a folder that cannot hold its results.
     """
     study = study_of(study, overrides, quick)
     store = None if out is None else Store(Path(out), study)
@@ -131,7 +131,7 @@ def run(
 
 
 def execute(case: Case, number: int, cases: int, tell: Listener, timing: Timing) -> Part:
-    """Run one case. Whatever it raises, an interruption excepted, becomes a row that says so."""
+    """Run one case. Every exception becomes a row that says so; an interruption (KeyboardInterrupt) is passed on."""
     try:
         with threadpool_limits(limits=1):
             clock = CLOCKS[timing.clock]
@@ -152,24 +152,24 @@ def execute(case: Case, number: int, cases: int, tell: Listener, timing: Timing)
 
 
 def unit_costs(record: Record, linear: LinearSolver, clock: Callable[[], float]) -> dict[str, float]:
-    """What work on the last problem of a march costs, as columns of `runs`; NaN where there is none to be measured."""
+    """Unit costs of the work on a case's last problem, as columns of `runs`; NaN if they cannot be measured."""
     nothing = dict.fromkeys(UNITS, float("nan"))
     if record.problem is None or record.state is None:
         return nothing
     try:
         return measure(record.problem, linear, record.state, clock=clock).columns()
-    except SolveError:  # the tangent at the end of the march, which its status tells of, cannot be factorised
+    except SolveError:  # the last tangent cannot be factorised, which the status of the case tells
         return nothing
 
 
 def _rounds(part: Part, timing: Timing) -> int:
-    """How often a case has been timed in the way the study asks for; 0 as well for one that crashed."""
+    """Number of rounds in which a case has been timed as the study asks; 0 for a case that crashed."""
     known, units = number(part.run.get("rounds")), UNITS[0] in part.run or not timing.calibrate
     return int(known) if known > 0 and units and part.run.get("clock") == timing.clock else 0
 
 
 def _fastest(before: Part | None, again: Part, timing: Timing) -> Part:
-    """Of the rounds of a case the one with the least seconds; its row knows the most of them, and their number."""
+    """The fastest timing round of a case. Its row also has the slowest round's seconds and the number of rounds."""
     if before is None or not _rounds(before, timing) or not _rounds(again, timing):
         return again
     best = min(before, again, key=lambda part: part.run["seconds"])
@@ -179,6 +179,10 @@ def _fastest(before: Part | None, again: Part, timing: Timing) -> Part:
 
 
 def study_of(study: Study | str | Path | Mapping[str, Any], overrides: Mapping[str, Any] | None, quick: bool) -> Study:
+    """`study` itself, or the study in a dictionary or a TOML file.
+
+    Raises StudyError for a study that is not valid, and for a `Study` given together with `overrides` or `quick`.
+    """
     if isinstance(study, Study):
         if overrides or quick:
             raise StudyError(f"{study.name}: overrides and quick are applied when a study is read, not when it is run")
@@ -203,7 +207,7 @@ def _merged(study: Study, parts: Mapping[str, Part]) -> Frames:
 
 
 def _of_case(case: str, frame: pd.DataFrame) -> pd.DataFrame:
-    """The frame with the case's name in front."""
+    """The frame with a first column `case`; without rows, a frame without columns."""
     if not len(frame):
         return pd.DataFrame()
     others = [name for name in frame.columns if name != "case"]
@@ -221,7 +225,7 @@ def _tables(study: Study, runs: pd.DataFrame) -> tuple[list[Table], list[str]]:
 
 
 def _show(store: Store, study: Study, frames: Frames) -> tuple[str, ...]:
-    """Write tables, figures and the report; what cannot be shown is told in a sentence, and never costs the results."""
+    """Write tables, figures and the report. Returns a sentence for each that cannot be shown; the results stay."""
     tables, notes = _tables(study, frames.runs)
     shown: dict[str, pd.DataFrame] = {}
     for table in tables:

@@ -1,4 +1,4 @@
-"""A results folder: the part of every finished case, tidy files of all of them, and the study that may resume it."""
+"""A results folder: the part of every finished case, the frames of all cases, and the description of the study."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ STUDY, CASES = "study.json", "cases"
 """Names of the file that describes the study, and of the folder of parts."""
 
 TRIED_AGAIN = frozenset({Status.CRASHED, Status.NOT_APPLICABLE})
-"""A case that ended so is run again: what it lacked may have been installed since."""
+"""A case with one of these statuses is run again: what it lacked may have been installed since."""
 
 
 class StoreError(InputError):
@@ -42,7 +42,7 @@ class Part:
 
 
 def merge(parts: list[Part]) -> Frames:
-    """The frames of several cases: `runs` with the documented columns first and the parameters behind them."""
+    """The frames of several cases; `runs` has the documented columns first, then the parameters."""
     names = list(dict.fromkeys([*RUNS, *(name for part in parts for name in part.run)]))
     runs = pd.DataFrame([part.run for part in parts], columns=names)
     steps, fields = _stacked([part.steps for part in parts], STEPS), _stacked([part.fields for part in parts], FIELDS)
@@ -127,7 +127,7 @@ class Store:
 
 
 def read_tables(folder: Path) -> tuple[list[TableSpec], pd.DataFrame]:
-    """The tables declared by the study of a results folder, and its runs."""
+    """The tables declared by the study of a results folder, and its runs. Raises StoreError if they cannot be read."""
     document = _read_study(folder)
     try:
         runs = pd.read_parquet(folder / "runs.parquet")
@@ -147,7 +147,7 @@ def _read_study(folder: Path) -> dict[str, Any]:
 
 
 def _identity(study: Study) -> dict[str, Any]:
-    """The description of a study in its folder; a run resumes where question and cases are the same."""
+    """The description of a study that its folder holds; a run is resumed if question and cases are the same."""
     return {
         "name": study.name,
         "question": study.question,

@@ -30,16 +30,16 @@ ROUNDS = 5
 """How often all kinds of work are timed in turn."""
 
 FEWEST_ROUNDS, ENOUGH_SECONDS = 2, 1.0
-"""Rounds that are made however long they take, and seconds after which no further one is begun."""
+"""Least number of rounds, and the time after which no further round begins [s]."""
 
 ORDER = 20
-"""Orders of the series that is timed; the cost of later ones is on the line through these."""
+"""Orders of the series that is timed; the cost of higher orders lies on the line through these."""
 
 PART_OF_STATE = 0.9
-"""R at this part of the solution is a right-hand side as a march has them; R at the solution is rounding."""
+"""Right-hand sides are R at this multiple of the solution, as large as in a march; R at the solution is rounding."""
 
 RATIO_OF_TERMS = 0.5
-"""Of the coefficients pushed: none of their products may become so small that arithmetic slows down."""
+"""Ratio of successive coefficients pushed: no product of them may become so small that arithmetic slows down."""
 
 
 CLOCKS: dict[str, Callable[[], float]] = {"wall": time.perf_counter, "processor": time.process_time}
@@ -47,8 +47,11 @@ CLOCKS: dict[str, Callable[[], float]] = {"wall": time.perf_counter, "processor"
 
 @dataclass(frozen=True)
 class Calibration:
-    """What a case that has not been run costs: its sizes (columns of `runs`), seconds of its operators, unit costs; the
-    last None where its discretisation or its first tangent is bad.
+    """What the work of a case costs, measured without running the case.
+
+    sizes : columns of `runs` for the size of the case.
+    operators : time in which its operators were built [s].
+    unit : unit costs [s]; None if the discretisation fails or the first tangent cannot be factorised.
     """
 
     sizes: Mapping[str, Any]
@@ -57,7 +60,7 @@ class Calibration:
 
 
 def calibrate(parts: Any, rounds: int = ROUNDS) -> Calibration:
-    """On the problem and the state that the simulation of a case gives as a sample."""
+    """Measure the costs of a case on the problem and the state that its simulation gives as a sample."""
     ledger = Ledger()
     simulation = parts.scene.simulation(parts, ledger.entry)
     with threadpool_limits(limits=1):
@@ -77,9 +80,9 @@ def measure(
     rounds: int = ROUNDS,
     clock: Callable[[], float] = time.process_time,
 ) -> UnitCosts:
-    """Medians of rounds in which every kind of work is done in turn, as a method does it, around a state (U,).
+    """Unit costs [s] at a state (U,): medians over rounds in which every kind of work is done in turn, as by a method.
 
-    A problem without series costs nothing for them. Raises SolveError where the tangent there cannot be factorised.
+    The costs of series are 0 for a problem without them. Raises SolveError if the tangent cannot be factorised.
     """
     watch = _Watch(clock)
     begun = clock()
@@ -127,5 +130,5 @@ class _Watch:
         return result
 
     def median(self, kind: str) -> float:
-        """Of this kind; 0 where none was done, as of series by a problem that has none."""
+        """Median seconds of one kind of work; 0 where none was done, as for the series of a problem without them."""
         return statistics.median(self._seconds[kind] or [0.0])

@@ -1,4 +1,4 @@
-"""A study file becomes cases: its sections, what is swept, and what is wrong with it, with its line.
+"""A study file becomes validated cases: sections, sweeps, and a sentence with the line for every mistake.
 
 It may import series, contracts, registry, results, solving, algebra, flow and show.
 """

@@ -1,4 +1,4 @@
-"""One document -> one validated case: its sections, what they are when left out, and what they must agree on."""
+"""One document -> one validated case: its sections, their defaults, and the checks that compare sections."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ COMMON: Mapping[str, Section] = {
     "stop": Section(StoppingTest),
     "budget": Section(Budget),
 }
-"""The sections of every case, beside `scene` and those that the scene's class declares."""
+"""The sections of every case, besides `scene` and those that the scene's class declares."""
 
 DIGEST_LETTERS = 12
 
@@ -41,11 +41,11 @@ class Case:
 
     id : digest of the validated components.
     parts : the validated component of each section, under its name.
-    parameters : every parameter under its dotted name ("solver.order"); lists as JSON text. Before them, where a sweep
-        has named settings, `variant` or what the sweep calls them: the names of this case's.
-    swept : the names among them that the study sweeps and that differ between its cases; `variant` stands for all that
-        its settings assign.
-    reference : id of the case whose velocities are held to be right; empty without one.
+    parameters : every parameter under its dotted name ("solver.order"); lists as JSON text. Where a sweep has named
+        settings, the names of this case's settings come first, under `variant` or the sweep's own `name`.
+    swept : names of the parameters that the study sweeps and that differ between its cases; `variant` stands for every
+        parameter that a named setting assigns.
+    reference : id of the reference case, with whose velocities this case's are compared; empty: there is none.
     """
 
     id: str
@@ -56,13 +56,13 @@ class Case:
 
     @property
     def label(self) -> str:
-        """The swept parameters, for people."""
+        """The swept parameters with their values, as text for people: "solver.order = 20"."""
         words = [f"{'' if names_settings(name) else f'{name} = '}{self.parameters[name]}" for name in self.swept]
         return ", ".join(words) or "the only case"
 
 
 class Invalid(Exception):
-    """What is wrong with a document that does not make a case."""
+    """Raised for a document that does not make a case; `problems` has an entry for each mistake."""
 
     def __init__(self, problems: list[Problem]) -> None:
         super().__init__()
@@ -70,7 +70,7 @@ class Invalid(Exception):
 
 
 class Composer:
-    """Makes cases of what is installed, and of the scenes that a document brings as instances."""
+    """Makes cases from documents, of the installed components and of those that a document holds as instances."""
 
     def __init__(self, registry: Registry, document: Document) -> None:
         self.registry = registry
@@ -83,11 +83,11 @@ class Composer:
 
     @property
     def sections(self) -> tuple[str, ...]:
-        """The parts of a study that cases are made of, and that can be swept: of all scenes there are."""
+        """Names of the sections that cases of any known scene may have; only their parameters can be swept."""
         return (Scene.noun, *self._all)
 
     def case(self, document: Document, points: Sequence[Point]) -> Case:
-        """The case of a document that the points of its sweeps have been assigned to. Raises Invalid."""
+        """The case of a document to which the values of `points`, one of each sweep, are assigned. Raises Invalid."""
         parts: Any = self.parts(document)
         if unclaimed := claims_missing(parts.solver, parts.stop):
             raise Invalid(unclaimed)
@@ -99,11 +99,11 @@ class Composer:
         plain = self.plain(parts)
         canonical = json.dumps(plain, sort_keys=True, separators=(",", ":"))
         digest = hashlib.sha256(canonical.encode()).hexdigest()[:DIGEST_LETTERS]
-        chosen = {name: section for name, section in plain.items() if section is not None}  # None: left out on purpose
+        chosen = {name: section for name, section in plain.items() if section is not None}  # None: it has no component
         return Case(digest, parts, *_parameters(chosen, points))
 
     def parts(self, document: Document) -> BaseModel:
-        """The validated components of all sections, those left out at their defaults."""
+        """The validated component of each section; a section that is left out gets its default. Raises Invalid."""
         scene = self.named(document, Scene.noun, Scene)
         if issubclass(scene, Scene):
             sections = sections_of(scene)
@@ -152,8 +152,10 @@ class Composer:
         return self._models[scene]
 
     def plain(self, parts: BaseModel) -> dict[str, Any]:
-        """The sections as JSON has them. A component that is not of the installed class of its kind has its `class`
-        beside it, so that cases of two classes differ.
+        """The sections as JSON values. A component whose class is not the installed one of its kind has an entry
+        `class` as well, so that cases of different classes get different digests.
+
+        Raises Invalid for a field that cannot be written as JSON.
         """
         try:
             plain = json.loads(parts.model_dump_json())
@@ -173,12 +175,12 @@ class Composer:
             plain["class"] = class_name(type(value))
 
     def named(self, document: Document, section: str, contract: type[Component]) -> type[Component]:
-        """The class that a section names, or is of; Component itself where there is none."""
+        """The class of the component that a section names by kind or holds as an instance, or Component."""
         return self.registry.class_of(contract.noun, document.get(section)) or Component
 
 
 def classes_in(document: Any) -> Iterator[type[Component]]:
-    """The classes of all components that stand somewhere in a document as instances."""
+    """The classes of all components that a document holds as instances, at any depth."""
     if isinstance(document, ComponentTable):
         yield document.cls
     if isinstance(document, Component):
@@ -192,7 +194,7 @@ def classes_in(document: Any) -> Iterator[type[Component]]:
 
 
 def sections_of(scene: type[Scene]) -> dict[str, Section]:
-    """The sections that a class of scenes declares, and those of every case that it does not declare otherwise."""
+    """The sections of a class of scenes, by name: those it declares, and those of `COMMON` that it does not replace."""
     return {**scene.sections, **{name: scene.sections.get(name, section) for name, section in COMMON.items()}}
 
 
@@ -201,14 +203,14 @@ def _plain(value: Any) -> Any:
 
 
 def _complete(document: Document, section: str, default: Mapping[str, Any]) -> None:
-    """Give a section that names no kind its default."""
+    """Fill in the default of a section that names no kind; values given in the section are kept."""
     given = document.get(section, {})
     if isinstance(given, dict) and "kind" not in given and not isinstance(given, ComponentTable):
         document[section] = {**default, **given}
 
 
 def claims_missing(solver: NonlinearSolver, stop: StoppingTest) -> list[Problem]:
-    """The problem of a stopping test that waits for a claim which the method never makes; none otherwise."""
+    """One problem if the stopping test waits for a claim that the method never makes; else an empty list."""
     if stop.kind != "claim" or solver.claims:
         return []
     sentence = f"the solver {solver.kind_name()!r} never claims a solution; use residual or difference"
@@ -216,7 +218,7 @@ def claims_missing(solver: NonlinearSolver, stop: StoppingTest) -> list[Problem]
 
 
 def unwritable(composition: BaseModel) -> list[str]:
-    """The sections that JSON cannot hold."""
+    """Names of the sections that cannot be written as JSON."""
     found = []
     for name in type(composition).model_fields:
         try:
@@ -227,7 +229,7 @@ def unwritable(composition: BaseModel) -> list[str]:
 
 
 def _parameters(plain: Mapping[str, Any], points: Sequence[Point]) -> tuple[dict[str, Any], tuple[str, ...]]:
-    """Every parameter of a composition, before them the names of its settings; and which of them are swept."""
+    """The names of a case's settings and all its parameters, under dotted names; and the names of the swept ones."""
     parameters = {name: json.dumps(value) if isinstance(value, list | dict) else value for name, value in leaves(plain)}
     assigned = [name for point in points if not point.name for name in point.values]
     swept = [

@@ -26,7 +26,7 @@ from nlsolve.study.timing import Timing
 
 
 class Frame(BaseModel):
-    """The parts of a study file around its components."""
+    """The entries of a study file that are not sections of its cases."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
@@ -43,7 +43,10 @@ class Frame(BaseModel):
 
 @dataclass(frozen=True)
 class Study:
-    """A question, the cases that answer it, and the tables and figures to show."""
+    """A question, the cases that answer it, and the tables and figures to show.
+
+    has_quick : whether the study has a [quick] section, which `quick=True` and --quick apply.
+    """
 
     name: str
     question: str
@@ -61,7 +64,8 @@ class Study:
         quick: bool = False,
         registry: Registry | None = None,
     ) -> Study:
-        """The study in a file. `overrides` are dotted names and values; `quick` applies the file's [quick] first.
+        """The study in a TOML file. `overrides` maps dotted names ("solver.order") to values; `quick` applies the
+        file's [quick] section before them.
 
         Raises StudyError with a sentence for each mistake: its line, its place, its value, and what is expected.
         """
@@ -86,7 +90,7 @@ class Study:
         registry: Registry | None = None,
         name: str = "study",
     ) -> Study:
-        """The same from Python. Sections and swept values may be components, of installed classes or of one's own.
+        """The study in a dictionary. Its sections and swept values may be component instances, installed or not.
 
         Raises StudyError as `from_toml` does.
         """
@@ -94,7 +98,7 @@ class Study:
 
 
 class _Builder:
-    """One study on its way from a document to cases, with all that an error message wants to tell."""
+    """Builds one study from a document; knows where each value was written, for the sentences of errors."""
 
     def __init__(
         self, source: Source, document: Mapping[str, Any], overrides: Mapping[str, Any], quick: bool, registry: Registry
@@ -189,7 +193,7 @@ class _Builder:
                 sentences += refused.sentences
                 continue
             source = self.source_of(points, named, by_hand)
-            twin = cases.setdefault(case.id, case)  # what is set by hand may make two cases one
+            twin = cases.setdefault(case.id, case)  # overrides may make two cases one
             names = [
                 ", ".join(word for name, word in each.parameters.items() if names_settings(name))
                 for each in (twin, case)
@@ -200,20 +204,21 @@ class _Builder:
                 place = next(point.place for point in points if point.name)
                 sentences.append(Problem(place, ABSENT, same).sentence(source))
         self.refuse_sentences(sentences)
-        cases = references | cases  # first, so that all others can be compared with them as they end
+        cases = references | cases  # references first: the other cases are compared with them as they end
         everyone = [case.parameters for case in cases.values()]
+        # Only a parameter that both cases have can differ: the defaults of one kind do not tell cases apart.
         differing = {
             name
             for parameters in everyone
             for name, value in parameters.items()
-            if any(name in other and other[name] != value for other in everyone)  # one kind's own defaults tell nothing
+            if any(name in other and other[name] != value for other in everyone)
         }
         return tuple(
             replace(case, swept=tuple(name for name in case.swept if name in differing)) for case in cases.values()
         )
 
     def combined(self, base: Document, points: tuple[Point, ...], by_hand: Mapping[str, Any], named: set[str]) -> Case:
-        """The case of one combination, the hand winning. Raises _Refused with sentences."""
+        """The case of one combination of points; overrides replace their values. Raises _Refused with sentences."""
         source = self.source_of(points, named, by_hand)
         assigned = {name: value for point in points for name, value in point.values.items()}
         document = merged({}, base)
@@ -234,7 +239,7 @@ class _Builder:
         by_hand: Mapping[str, Any],
         named: set[str],
     ) -> Case:
-        """The same combination as the reference has it: what its table sets, nobody else does."""
+        """The reference case of one combination of points; neither points nor overrides replace what `table` sets."""
         column = next((point.column for point in points if point.name), VARIANT)
         made = Setting.model_validate({"name": REFERENCE, **table}).point((REFERENCE,), column)
 
@@ -251,7 +256,7 @@ class _Builder:
         return self.combined(base, (*left, made), others(by_hand), named | set(made.values))
 
     def source_of(self, points: tuple[Point, ...], named: set[str], by_hand: Mapping[str, Any]) -> Source:
-        """Where the values of one combination were written; the hand wins here too."""
+        """Where the values of one combination were written; for a value that is overridden, --set or [quick]."""
         hand = dict(leaves(by_hand))
         known = {name: where for name, where in self.source.aliases.items() if name in hand or name not in named}
         mine = {name: place for point in points for name, place in point.places.items() if name not in hand}
@@ -259,7 +264,7 @@ class _Builder:
 
 
 class _Refused(Exception):
-    """A combination that does not make a case, in sentences with their places."""
+    """Raised for a combination that does not make a case; `sentences` say why, each with its place."""
 
     def __init__(self, sentences: list[str]) -> None:
         super().__init__()

@@ -1,4 +1,4 @@
-"""What is varied and what is set by hand: sweeps, overrides, and how they change a study's document."""
+"""Sweeps and overrides, and how their values are assigned to a study's document."""
 
 from __future__ import annotations
 
@@ -24,8 +24,10 @@ Document = dict[str, Any]
 
 @dataclass(frozen=True)
 class Point:
-    """One choice of a sweep: what it sets. A named setting also knows the column of `runs` its name goes into, and
-    where it and each of its values are written.
+    """The values, by dotted name, that one point of a sweep assigns.
+
+    name, column : of a named setting, its name and the column of `runs` that holds it.
+    place, places : where the setting, and each of its values, is written in the document.
     """
 
     values: dict[str, Any]
@@ -36,14 +38,14 @@ class Point:
 
 
 class Setting(BaseModel):
-    """A named table of assignments; one without any is the study as it is."""
+    """A named table of assignments; an empty one leaves the study unchanged."""
 
     model_config = ConfigDict(frozen=True, extra="allow")
 
     name: str = Field(min_length=1, description="what the setting is called in `variant`")
 
     def point(self, place: Place = (), column: str = VARIANT) -> Point:
-        """What it sets; `place` is where it is written."""
+        """The setting as a point of its sweep; `place` is where it is written."""
         table = self.model_extra or {}
         places = {name: (*place, *inside) for name, inside in places_of(table, whole_kinds=True).items()}
         return Point(dict(leaves(table, whole_kinds=True)), self.name, column, place, places)
@@ -57,9 +59,9 @@ class Sweep(BaseModel):
     each = [ { name = "p = 40", solver = { kind = "anm", order = 40 } },
              { name = "ε₀ = 10", "law.regularization" = 10.0 }, { name = "as it is" } ]  three points
 
-    A table with a `kind` replaces the section it is for. The names of the settings become the column `variant` of
-    `runs`, joined by commas where several sweeps have them, or the column that the sweep's `name` asks for; they are
-    no part of a case's identity.
+    A table with a `kind` replaces its whole section. The names of settings are written to a column of `runs`: to
+    `variant`, or to the one that the sweep's `name` gives; names from several sweeps in one column are joined by
+    commas. They do not enter a case's id.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
@@ -101,7 +103,7 @@ class Sweep(BaseModel):
 
     @property
     def columns(self) -> dict[str, list[Any]]:
-        """Values by parameter."""
+        """The swept values of each parameter, under its dotted name."""
         if self.each is None:
             return self.grid or self.zip or {}
         found: dict[str, list[Any]] = {}
@@ -111,7 +113,7 @@ class Sweep(BaseModel):
         return found
 
     def points(self, place: Place = ()) -> list[Point]:
-        """What is set, point by point; `place` is where the sweep is written."""
+        """The points of the sweep, in order; `place` is where the sweep is written."""
         if self.each is not None:
             return [setting.point((*place, "each", number), self.name) for number, setting in enumerate(self.each)]
         rows = (
@@ -121,7 +123,7 @@ class Sweep(BaseModel):
 
 
 def assign_all(document: Document, values: Mapping[str, Any]) -> list[Problem]:
-    """Set dotted names in a document; a problem for each that leads through something that is not a table."""
+    """Set values in a document by dotted name; a problem for each name that leads through a value that is no table."""
     problems = []
     for name, value in values.items():
         *parents, last = name.split(".")
@@ -138,7 +140,7 @@ def assign_all(document: Document, values: Mapping[str, Any]) -> list[Problem]:
 
 
 def merged(old: Any, new: Any) -> Any:
-    """`new` over `old`: a component, or a table with a `kind`, replaces what was there; one without is merged into it.
+    """`new` merged over `old`: a component, or a table with a `kind`, replaces `old`; other tables are merged into it.
 
     A component becomes a table that remembers its class, so that its fields can be set one by one.
     """
@@ -154,7 +156,7 @@ def merged(old: Any, new: Any) -> Any:
 
 
 def leaves(table: Mapping[str, Any], above: str = "", whole_kinds: bool = False) -> Iterator[tuple[str, Any]]:
-    """Dotted name and value of everything that is not itself a table, or (`whole_kinds`) is one with a `kind`."""
+    """Dotted name and value of every entry that is no table; with `whole_kinds`, a table with a `kind` is a value."""
     for name, value in table.items():
         if isinstance(value, Mapping) and value and not (whole_kinds and "kind" in value):
             yield from leaves(value, f"{above}{name}.", whole_kinds)
@@ -163,7 +165,7 @@ def leaves(table: Mapping[str, Any], above: str = "", whole_kinds: bool = False)
 
 
 def swept_places(document: Document) -> dict[str, Place]:
-    """Where in a document every swept parameter has its values, whatever else is wrong with the document."""
+    """Where a document has the values of each swept parameter. The document need not be valid."""
     sweeps = document.get("sweep")
     return {
         name: ("sweep", number, mode, *inside, *place)
@@ -176,7 +178,7 @@ def swept_places(document: Document) -> dict[str, Place]:
 
 
 def _tables_in(written: Any) -> list[tuple[Place, Mapping[str, Any]]]:
-    """A table, or the tables of a list, each with its place; nothing else."""
+    """`written` itself if it is a table, or its tables if it is a list, each with its place in `written`."""
     found = enumerate(written) if isinstance(written, list) else [((), written)]
     return [((place,) if isinstance(place, int) else (), table) for place, table in found if isinstance(table, dict)]
 
@@ -188,7 +190,10 @@ def places_of(table: Mapping[str, Any], whole_kinds: bool = False) -> dict[str, 
 
 
 def parse_assignments(texts: list[str]) -> dict[str, Any]:
-    """`key=value` as given to --set; a value that is not TOML is a string. Raises StudyError."""
+    """Values by name from the `key=value` of --set; a value that is not TOML is a string.
+
+    Raises StudyError for a text that is not key=value.
+    """
     parsed = {}
     for text in texts:
         name, equals, value = text.partition("=")

@@ -1,4 +1,4 @@
-"""How the cases of a study are timed."""
+"""The section `timing` of a study."""
 
 from __future__ import annotations
 

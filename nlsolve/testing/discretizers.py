@@ -15,9 +15,11 @@ from nlsolve.testing.promises import require, same, shaped
 
 
 def check_discretizer(discretizer: Discretizer, cloud: Cloud, tolerance: float = 1e-10) -> None:
-    """Shapes, and what a consistent scheme reproduces, to `tolerance` of the sizes summed: no strain of rigid motions,
-    constant strain rate of linear velocities, no force of constant stress or pressure, values and gradients of linear
-    fields. Besides, of a strong form the divergence of linear stress; of a conservative one that it is adjoint.
+    """Check the shapes of the operators, and what they reproduce to `tolerance` of the sizes summed.
+
+    Rigid motions have no strain, linear velocities a constant strain rate; constant stress and constant pressure exert
+    no force; values and gradients of linear fields are exact. In a strong form the divergence of a linear stress is
+    exact; a conservative form is adjoint, S = −Bᵀ A and S_θ = −B_θᵀ A_θ. Raises AssertionError.
     """
     n, free, extent = len(cloud.nodes), cloud.interior, float(np.ptp(cloud.nodes, axis=0).max())
     plain, full = discretizer.operators(cloud, False), discretizer.operators(cloud, True)
@@ -73,7 +75,7 @@ def check_discretizer(discretizer: Discretizer, cloud: Cloud, tolerance: float =
 
 
 def _check_adjoint(operators: Operators, free: Array) -> None:
-    """S + Bᵀ A = 0 and S_θ + B_θᵀ A_θ = 0 on the unknowns; no area is negative, and nodes have some."""
+    """S + Bᵀ A = 0 and S_θ + B_θᵀ A_θ = 0 on the unknowns; areas are ≥ 0, and > 0 at interior nodes."""
     assert operators.volumetric is not None
     assert operators.node_areas is not None
     for name, pair in (("S = −Bᵀ A", operators.strain), ("S_θ = −B_θᵀ A_θ", operators.volumetric)):

@@ -12,8 +12,9 @@ from nlsolve.testing.promises import ORDER, PARTS, check_coefficients, require, 
 
 
 def check_law(law: ConstitutiveLaw, rates: Iterable[float] = tuple(10.0 ** np.arange(-1.0, 4.5, 0.5))) -> None:
-    """μ(ε̄²) at the given ε̄ [1/s]: positive and finite; its derivative by seed against central differences to 1e-7; its
-    Taylor coefficients along a path ε̄²(a) against μ on that path; and that it is continued by fields it has.
+    """Check μ(ε̄²) at the given ε̄ [1/s]: positive and finite; its derivative by seed against central differences, to
+    1e-7; its Taylor coefficients along a path ε̄²(a) against μ on that path. Every name in `continued_by` must be a
+    field of the law. Raises AssertionError.
     """
     strange = [name for name in law.continued_by if name not in type(law).model_fields]
     require(not strange, f"the law is continued by {strange}, which are none of its fields")

@@ -13,9 +13,11 @@ from nlsolve.testing.promises import require, same
 
 
 def check_linear_solver(linear: LinearSolver) -> None:
-    """A x = b to 1e-10 with factors of the same matrix, of a like one and of another pattern lent, and none; on a
-    symmetric matrix, and on one with zeros on its diagonal; the factors lent stay good. A named ordering and a fill;
-    the work of a solve is owned up to, also in the ledger. A matrix that is singular or not finite ends in SolveError.
+    """Check A x = b to 1e-10 on matrices of equal and of other patterns, one symmetric, one with zeros on its diagonal.
+
+    Each matrix is factorised with the factors of the one before as `previous`, which must stay usable. The factors must
+    name their ordering, and tell their fill and the work of each solve. A matrix that is singular or not finite must
+    end in SolveError. Raises AssertionError.
     """
     random = np.random.default_rng(0)
     matrix = sp.random_array((60, 60), density=0.1, rng=random, format="csr")
@@ -42,7 +44,7 @@ def check_linear_solver(linear: LinearSolver) -> None:
 
 
 def _check_refused(linear: LinearSolver, matrix: Any) -> None:
-    """What has no solution, or is no matrix, is refused in words."""
+    """A matrix that is singular or not finite must end in SolveError with the status that says so."""
     row, column, not_finite = matrix.toarray(), matrix.toarray(), matrix.copy()
     row[7] = 0.0
     column[:, 7] = 0.0

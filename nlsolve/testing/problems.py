@@ -12,8 +12,8 @@ from nlsolve.testing.promises import ORDER, PARTS, check_coefficients, norm, req
 
 
 def check_problem(problem: NonlinearProblem, u: Array, tolerance: float = 1e-6) -> None:
-    """J d against central differences of R along random d, to `tolerance`; R_j along a path against R on that path, of
-    a problem that has a series.
+    """Check J d against central differences of R along random d, to `tolerance`, at a state u (U,); for a problem that
+    has series, R_j along a path against R on that path. Raises AssertionError.
     """
     random = np.random.default_rng(0)
     size = norm(u) / np.sqrt(len(u)) or 1.0
@@ -29,7 +29,7 @@ def check_problem(problem: NonlinearProblem, u: Array, tolerance: float = 1e-6) 
 
 
 def _check_series(problem: NonlinearProblem, u: Array, jacobian: Any, size: float, random: np.random.Generator) -> None:
-    """R_j and Q_j along a random path that begins with u."""
+    """Check R_j and Q_j along a random path that begins at u (U,)."""
     expansion = problem.expand(u)
     path = Series(u)
     for j in range(1, ORDER + 1):

@@ -1,4 +1,4 @@
-"""What the checks are made of: a sentence for what does not hold, differences, coefficients."""
+"""Helpers of the checks: a sentence for a broken promise, comparison of arrays, of shapes and of coefficients."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ import numpy as np
 
 from nlsolve.series import Array
 
-ORDER = 4  # of the truncated sums that series are compared with
-PARTS = 0.5 ** np.arange(2, 22)  # steps and path lengths tried; the best of them escapes truncation and rounding both
+ORDER = 4  # the highest Taylor coefficient that is checked
+PARTS = 0.5 ** np.arange(2, 22)  # steps and path lengths tried; at the best, truncation and rounding are small
 
 
 def require(holds: Any, sentence: str) -> None:
-    """AssertionError with this sentence where a promise is broken."""
+    """Raise AssertionError with this sentence unless the promise holds."""
     if not holds:
         raise AssertionError(sentence)
 
@@ -25,13 +25,13 @@ def norm(value: Any) -> float:
 
 
 def same(found: Any, expected: Any, scale: float, what: str, tolerance: float = 1e-10) -> None:
-    """Largest difference ≤ tolerance · scale."""
+    """max |found − expected| ≤ tolerance · scale. Raises AssertionError, which names `what`."""
     off = float(np.max(np.abs(found - expected), initial=0.0))
     require(off <= tolerance * scale, f"{what}: off by {off:.2e}, allowed {tolerance:g} of {scale:.2e}")
 
 
 def shaped(found: Any, shape: tuple[int, ...], what: str) -> None:
-    """An array of this shape."""
+    """Raise AssertionError, which names `what`, unless `found` is an array of this shape."""
     is_of = getattr(found, "shape", None)
     require(is_of == shape, f"{what} of shape {is_of}, not {shape}")
 

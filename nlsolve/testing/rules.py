@@ -12,8 +12,10 @@ from nlsolve.testing.toy_problem import ToyProblem
 
 
 def check_globalization(globalization: Globalization) -> None:
-    """On a toy problem with a potential: a positive length, the residual of the state it leads to, nothing changed in
-    what was handed over; near the solution Newton's full step; no memory from one solve to the next.
+    """Check the search for step lengths on a toy problem with a potential.
+
+    The length is positive and comes with the residual of the state it leads to; no argument is changed; near the
+    solution Newton's full step is taken; one solve remembers nothing of another. Raises AssertionError.
     """
     problem = ToyProblem()
     problem.is_gradient = True  # A is symmetric
@@ -37,8 +39,10 @@ def check_globalization(globalization: Globalization) -> None:
 
 
 def check_predictor(predictor: Predictor) -> None:
-    """A flow that stays as it is goes on as it is, to 1e-12, however few increments are known; a guess has the shape of
-    the velocities, leaves them as they were, and is the same each time.
+    """Check the guesses from 1, 2, … `depth` known increments.
+
+    The guess of a steady flow is that flow, to 1e-12. A guess has the shape of the velocities, does not change them,
+    and is the same each time. Raises AssertionError.
     """
     require(predictor.depth >= 1, f"a depth of {predictor.depth}: at least the last increment is looked at")
     steady = np.random.default_rng(0).standard_normal((7, 2))
@@ -52,7 +56,9 @@ def check_predictor(predictor: Predictor) -> None:
 
 
 def check_refresh_rule(rule: RefreshRule) -> None:
-    """A plain answer to any history, the same each time, also to what has not been observed (None) or is no number."""
+    """Check that `due` answers True or False to any history, also one with None (not observed) or NaN, and the same
+    each time. Raises AssertionError.
+    """
     for seen in (None, 0.0, 0.5, 1.0, 1e9, np.nan):
         for history in (TangentHistory(1, seen), TangentHistory(1, None, seen), TangentHistory(99, seen, seen)):
             first, again = rule.due(history), rule.due(history)

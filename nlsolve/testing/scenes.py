@@ -1,4 +1,4 @@
-"""A cloud and what is prescribed on it, or a formula and its roots: the checks of scenes."""
+"""The checks of scenes: of a flow's cloud and boundary, and of a system's formula and roots."""
 
 from __future__ import annotations
 
@@ -14,8 +14,11 @@ from nlsolve.testing.promises import norm, require, same, shaped
 
 
 def check_scene(scene: Geometry, law: ConstitutiveLaw) -> None:
-    """A cloud with an inside and boundary groups that share no node; boundary nodes that start where they are; shapes;
-    an exact velocity, where there is one, that agrees with the prescribed one.
+    """Check the cloud of a flow, and what is prescribed on it.
+
+    The cloud has interior nodes, and boundary groups that share no node; `boundary_position` at t = 0 gives the
+    boundary nodes; velocities and forces have the shape of their points. An exact velocity, where there is one, agrees
+    with the prescribed one on the boundary to 1e-12. Raises AssertionError.
     """
     cloud = scene.cloud(law)  # raises for coincident nodes
     members = np.concatenate([np.asarray(group) for group in cloud.boundaries.values()])
@@ -44,9 +47,11 @@ def check_scene(scene: Geometry, law: ConstitutiveLaw) -> None:
 
 
 def check_system(system: System, tolerance: float = 1e-6) -> None:
-    """A finite start; a formula that treats columns one by one; a pattern that covers the Jacobian; `check_problem`
-    beside the start; and known roots to 1e-12: F is zero to rounding there and, unless the system says that its roots
-    are singular, a Newton step in extended precision stays.
+    """Check the start, the formula, the pattern and the roots of a system.
+
+    The start is finite; the formula treats columns one by one; the pattern covers the Jacobian; `check_problem` holds
+    at a state near the start. Known roots are exact to 1e-12: F is zero there to rounding and, unless the system
+    declares its roots `singular`, a Newton step in extended precision stays there. Raises AssertionError.
     """
     start = system.start()
     require(start.ndim == 1 and np.isfinite(start).all(), f"the start should be a finite (U,) array, not {start}")

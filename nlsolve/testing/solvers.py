@@ -20,8 +20,10 @@ from nlsolve.testing.toy_problem import DenseLU, ToyProblem
 
 
 def check_solver(solver: NonlinearSolver, rule: RefreshRule | None = None) -> None:
-    """The start comes first and is left as it was, like every state after it; a toy problem is solved to 1e-10 under
-    the driver; what linear solver and problem were asked for is in the ledger.
+    """Check a method on a toy problem under the driver.
+
+    The start is yielded first; neither it nor a state yielded later is changed; the problem is solved to 1e-10; all
+    work asked of the linear solver and the problem is in the ledger. Raises AssertionError.
 
     rule : the refresh rule of K*; without one K* is renewed at every iteration.
     """

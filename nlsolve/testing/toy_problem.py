@@ -15,11 +15,12 @@ from nlsolve.series import Array, Series
 
 
 class DenseLU(LinearSolver):
-    """LAPACK, for small problems. `asked` counts, beside any ledger, what all instances have been asked for."""
+    """A = P L U by LAPACK, for small problems. `asked` counts the work asked of all instances, without a ledger."""
 
     asked: ClassVar[Counter[str]] = Counter()
 
     def factorize(self, matrix: Any, previous: Factors | None = None) -> Factors:
+        """The dense factors of a sparse matrix (U, U)."""
         self.asked["factorization"] += 1
         return _DenseFactors(matrix)
 
@@ -40,17 +41,21 @@ class ToyProblem(NonlinearProblem):
     matrix = sp.diags_array([-np.ones(11), 4.0 * np.ones(12), -np.ones(11)], offsets=[-1, 0, 1], format="csr")
 
     def residual(self, u: Any) -> Any:
+        """R(u), (U,)."""
         return self.matrix @ u + np.sinh(u) - (self.matrix @ self.solution + np.sinh(self.solution))
 
     def jacobian(self, u: Array) -> Any:
+        """J(u) = A + diag(cosh u), sparse (U, U)."""
         DenseLU.asked["jacobian"] += 1
         return (self.matrix + sp.diags_array(np.cosh(u))).tocsr()
 
     def secant(self, u: Array) -> Any:
+        """A + diag(sinh(u)/u), sparse (U, U), whose product with u is A u + sinh u."""
         DenseLU.asked["jacobian"] += 1
         ratio = np.divide(np.sinh(u), u, out=np.ones_like(u), where=u != 0.0)
         return (self.matrix + sp.diags_array(ratio)).tocsr()
 
     def expand(self, u: Array) -> Expansion:
+        """The expansion of R along a path that begins at u (U,)."""
         path = Series(u)
         return Expansion(path, self.residual(path))

@@ -12,4 +12,5 @@ from nlsolve_discretizers.radial_basis import RadialBasis
 
 @hookimpl
 def nlsolve_components() -> Iterable[type[Component]]:
+    """The discretizers of this package."""
     return [MovingLeastSquares, RadialBasis, LinearTriangles]

@@ -51,7 +51,9 @@ class Collocation(Discretizer):
 
     @abstractmethod
     def supports(self, sources: np.ndarray, targets: np.ndarray, role: str, cloud: Cloud | None) -> Supports:
-        """Neighbours for the weights in a role: "strain", "force" or "volume" on a cloud, "value" anywhere."""
+        """Neighbours of the targets (T, 2) among the sources (S, 2) [mm], for the weights in a role: "strain", "force"
+        or "volume" on a cloud, "value" at any points.
+        """
 
     @abstractmethod
     def local_weights(
@@ -63,7 +65,7 @@ class Collocation(Discretizer):
 
     @abstractmethod
     def refusal(self, count: int, place: np.ndarray, quality: float) -> SolveError | None:
-        """What is wrong with the worst support, of `count` neighbours around `place`; None when it will do."""
+        """The error for the worst support, of `count` neighbours around `place` (2,) [mm]; None if it will do."""
 
     def weights(
         self,
@@ -106,9 +108,11 @@ class Collocation(Discretizer):
         return self._operators(Neighbours(Triangles.of(cloud)), volumetric)
 
     def moved(self, operators: Operators, cloud: Cloud) -> Operators | None:
-        """With the same triangles, patches and supports, unless a triangle is turned inside out."""
+        """The operators on the moved cloud, with the triangles, patches and supports of before; None if a triangle is
+        turned inside out.
+        """
         near = operators.neighbours.moved_to(cloud)
-        return self._operators(near, operators.volumetric is not None) if near.triangles.as_column else None
+        return self._operators(near, operators.volumetric is not None) if near.triangles.are_upright else None
 
     def _operators(self, near: Neighbours, volumetric: bool) -> Operators:
         build = self._conservative if self.form == "conservative" else self._strong
@@ -158,7 +162,7 @@ class Collocation(Discretizer):
         return sparse_rows([[(supports.index, value)]], (len(targets), len(sources)))
 
     def diagnostics(self, cloud: Cloud) -> list[dict[str, Any]]:
-        """A row each for the strain, force and volume weights of a cloud."""
+        """One row each for the strain, force and volume weights of a cloud."""
         points = Triangles.of(cloud).midpoints() if self.points == "between" else cloud.nodes
         roles = {
             "strain": (cloud.nodes, points),
@@ -181,14 +185,14 @@ class Collocation(Discretizer):
         cloud: Cloud,
         found: dict[str, Supports] | None = None,
     ) -> Gradient:
-        """Supports are taken from those `found` before, and put there."""
+        """∂/∂x and ∂/∂y at the targets. `found` holds the supports by role; the ones used here are put there."""
         found = {} if found is None else found
         found[role], (dx, dy) = self.weights(sources, targets, role, GRADIENT, cloud, found.get(role))
         return Gradient(found[role].index, dx, dy)
 
 
 def _batches(counts: np.ndarray, targets: np.ndarray) -> Iterator[tuple[int, np.ndarray]]:
-    """The targets (a part of all) that have equally many neighbours, AT_ONCE or fewer at a time."""
+    """Number of neighbours, and at most AT_ONCE of the `targets` (indices) that have so many, batch by batch."""
     for count in np.unique(counts[targets]):
         alike = targets[counts[targets] == count]
         yield from ((int(count), alike[begin : begin + AT_ONCE]) for begin in range(0, len(alike), AT_ONCE))

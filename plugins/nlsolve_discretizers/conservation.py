@@ -21,7 +21,7 @@ NEARNESS = 4.0
 """Shape of the weights w: changes fall on the nearest nodes, where they cost least accuracy (measured: 3.5 to 5)."""
 
 LARGEST_CORRECTION = 2.0
-"""Of the gradients, relative to them. Usual supports need 0.04 to 1, supports without freedom 6 to 80."""
+"""Largest correction, relative to the gradients. Usual supports need 0.04 to 1, those without freedom 6 to 80."""
 
 
 def conserving(cloud: Cloud, points: np.ndarray, areas: np.ndarray, gradient: Gradient) -> Gradient:
@@ -31,7 +31,7 @@ def conserving(cloud: Cloud, points: np.ndarray, areas: np.ndarray, gradient: Gr
     conditioned) when the correction is larger than what it corrects.
     """
     near, n, free = gradient.near, len(cloud.nodes), cloud.interior
-    felt = (gradient.dx != 0.0) | (gradient.dy != 0.0)  # not by what only fills up a support
+    felt = (gradient.dx != 0.0) | (gradient.dy != 0.0)  # zero weights only fill up a support
     offsets = np.where(felt[..., None], cloud.nodes[near] - points[:, None], 0.0)
     radius = np.linalg.norm(offsets, axis=2).max(axis=1)
     offsets /= radius[:, None, None]

@@ -15,7 +15,7 @@ from nlsolve_discretizers.weights.supports import Supports
 from nlsolve_discretizers.weights.triangles import Triangles
 
 NEARBY = MovingLeastSquares(degree=1, support=6)
-"""Gives values between points, and gradients at nodes, for measures and figures."""
+"""Gives values at any points, for observables and figures."""
 
 
 class LinearTriangles(Discretizer):
@@ -32,9 +32,9 @@ class LinearTriangles(Discretizer):
         return _operators(Triangles.of(cloud), volumetric)
 
     def moved(self, operators: Operators, cloud: Cloud) -> Operators | None:
-        """The same triangles and patches, unless a triangle is turned inside out."""
+        """The operators on the moved cloud with the same triangles; None if a triangle is turned inside out."""
         triangles = operators.neighbours.moved_to(cloud)
-        return _operators(triangles, operators.volumetric is not None) if triangles.as_column else None
+        return _operators(triangles, operators.volumetric is not None) if triangles.are_upright else None
 
     def gradient(self, cloud: Cloud) -> tuple[Any, Any]:
         """∂/∂x and ∂/∂y at the nodes: means over the triangles around each, by area."""
@@ -52,7 +52,7 @@ class LinearTriangles(Discretizer):
         return NEARBY.values(sources, targets)
 
     def diagnostics(self, cloud: Cloud) -> list[dict[str, Any]]:
-        """A row for the strain weights: the triangles themselves."""
+        """One row, for the strain weights; their supports are the triangles."""
         triangles = Triangles.of(cloud)
         gradient, centroids = _gradient(triangles), triangles.centroids()
         radius = np.linalg.norm(cloud.nodes[triangles.corners] - centroids[:, None], axis=2).max(axis=1)

@@ -37,7 +37,7 @@ class MovingLeastSquares(Collocation):
         return self
 
     def supports(self, sources: np.ndarray, targets: np.ndarray, role: str, cloud: Cloud | None) -> Supports:
-        """By count or by radius; values have the support of strains."""
+        """The nearest sources by count, or those within `radius`; values have as many neighbours as strains."""
         if self.radius is not None:
             return Supports.within(sources, targets, self.radius)
         count = {"force": self.force_support, "volume": self.volume_support}.get(role, self.support)
@@ -46,11 +46,11 @@ class MovingLeastSquares(Collocation):
     def local_weights(
         self, offsets: np.ndarray, radius: np.ndarray, derivatives: Derivatives
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Least squares; the quality of a support is its smallest pivot."""
+        """Weights by least squares; the quality of a support is its smallest pivot."""
         return fit(offsets, radius, self.degree, derivatives, self.weight, self.shape)
 
     def refusal(self, count: int, place: np.ndarray, quality: float) -> SolveError | None:
-        """The polynomial must be determined."""
+        """An error (bad cloud) if the neighbours do not determine the polynomial."""
         if quality > SMALLEST_PIVOT:
             return None
         return SolveError(

@@ -14,7 +14,7 @@ from nlsolve_discretizers.weights.radial import interpolate, kernel
 from nlsolve_discretizers.weights.supports import Supports
 
 ILL_CONDITIONED = 1e-14  # reciprocal condition number of a local system whose solution is noise
-AT_BOUNDARIES = 1.5  # size of the supports that hold a boundary node, over that of the others
+AT_BOUNDARIES = 1.5  # neighbours of a target near a boundary node, over those of the others
 
 
 class RadialBasis(Collocation):
@@ -43,7 +43,9 @@ class RadialBasis(Collocation):
         return self
 
     def supports(self, sources: np.ndarray, targets: np.ndarray, role: str, cloud: Cloud | None) -> Supports:
-        """The same number for every role, half as many more where the target is about as near to a wall as to nodes."""
+        """As many neighbours for every role, and half as many more for a target whose nearest boundary node lies within
+        half the radius of its support.
+        """
         count = self.support or 2 * least_count(self.degree)
         supports = Supports.nearest(sources, targets, count, self.balanced)
         if cloud is None:
@@ -58,13 +60,13 @@ class RadialBasis(Collocation):
     def local_weights(
         self, offsets: np.ndarray, radius: np.ndarray, derivatives: Derivatives
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Interpolation; the quality of a support is the reciprocal condition number of its system."""
+        """Weights by interpolation; the quality of a support is the reciprocal condition number of its local system."""
         radius_in_spacings = (offsets.shape[1] / np.pi) ** 0.5
         phi = kernel(self.kernel, self.power, self.shape * radius_in_spacings)
         return interpolate(offsets, radius, self.degree, derivatives, phi)
 
     def refusal(self, count: int, place: np.ndarray, quality: float) -> SolveError | None:
-        """The local system must be solvable in working precision."""
+        """An error (ill conditioned) if the local system cannot be solved in working precision."""
         if quality >= ILL_CONDITIONED:
             return None
         way_out = "widen the supports" if self.kernel == "phs" else "raise discretizer.shape or use the kernel phs"

@@ -1,4 +1,4 @@
-"""First-party constitutive laws."""
+"""Constitutive laws μ(ε̄²), one in each file; Bingham's is beside that of Herschel and Bulkley."""
 
 from __future__ import annotations
 
@@ -15,4 +15,5 @@ from nlsolve_laws.sellars_tegart import SellarsTegart
 
 @hookimpl
 def nlsolve_components() -> Iterable[type[Component]]:
+    """The laws of this package."""
     return [PowerLaw, NortonHoff, CarreauYasuda, Cross, HerschelBulkley, Bingham, SellarsTegart]

@@ -27,7 +27,7 @@ class CarreauYasuda(ConstitutiveLaw):
 
     @property
     def regularization_rate(self) -> float:
-        """ε₀."""
+        """ε₀ [1/s]."""
         return self.regularization
 
     def viscosity(self, rate_squared: Any) -> Any:

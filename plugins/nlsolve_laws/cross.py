@@ -26,7 +26,7 @@ class Cross(ConstitutiveLaw):
 
     @property
     def regularization_rate(self) -> float:
-        """ε₀."""
+        """ε₀ [1/s]."""
         return self.regularization
 
     @model_validator(mode="after")

@@ -11,7 +11,7 @@ from nlsolve.plugin import ConstitutiveLaw, PowerForm
 
 
 class _Yielding(ConstitutiveLaw):
-    """What Bingham's and Herschel and Bulkley's laws share: below σ_y they creep at rates of 1/m or ε₀, the larger."""
+    """The yield stress of the laws below. Under σ_y they creep at rates of about 1/m or ε₀, whichever is larger."""
 
     continued_by: ClassVar = {"regularization": "larger", "yield_stress": "smaller", "growth": "smaller"}
 
@@ -21,7 +21,7 @@ class _Yielding(ConstitutiveLaw):
 
     @property
     def regularization_rate(self) -> float:
-        """ε₀."""
+        """ε₀ [1/s]."""
         return self.regularization
 
     def _rate(self, rate_squared: Any) -> Any:

@@ -24,7 +24,7 @@ class NortonHoff(ConstitutiveLaw):
 
     @property
     def regularization_rate(self) -> float:
-        """ε₀."""
+        """ε₀ [1/s]."""
         return self.regularization
 
     def viscosity(self, rate_squared: Any) -> Any:

@@ -33,7 +33,7 @@ class SellarsTegart(ConstitutiveLaw):
 
     @property
     def regularization_rate(self) -> float:
-        """ε₀."""
+        """ε₀ [1/s]."""
         return self.regularization
 
     def viscosity(self, rate_squared: Any) -> Any:

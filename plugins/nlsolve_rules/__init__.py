@@ -26,4 +26,5 @@ GLOBALIZATIONS = (FullSteps, Backtracking, Cubic, NonMonotone, Energy)
 
 @hookimpl
 def nlsolve_components() -> Iterable[type[Component]]:
+    """The refresh rules, predictors and globalisations of this package."""
     return (*REFRESH_RULES, *PREDICTORS, *GLOBALIZATIONS)

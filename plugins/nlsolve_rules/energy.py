@@ -9,17 +9,17 @@ from pydantic import Field
 
 from nlsolve.plugin import Globalization, NonlinearProblem, Search, SolveError, Status
 
-SLOPE_LEFT = 0.1  # of the potential along the direction, over the first: small enough to stop searching
+SLOPE_LEFT = 0.1  # slope of Φ along w over the one at t = 0: small enough to stop searching
 
 
 class Energy(Globalization):
-    """For an R that is the gradient of a convex potential, which falls at each step, be ‖R‖ what it may."""
+    """For an R that is the gradient of a convex potential: the potential falls at each step, even where ‖R‖ grows."""
 
     kind: Literal["energy"] = "energy"
     trials: int = Field(10, gt=0, description="lengths t that may be tried besides the full step")
 
     def search(self, problem: NonlinearProblem) -> Search:
-        """Refused where R has no potential."""
+        """The search of one solve. Raises SolveError (not applicable) if R has no potential."""
         if not problem.is_gradient:
             raise SolveError(
                 Status.NOT_APPLICABLE,
@@ -45,7 +45,7 @@ class LeastEnergy:
         direction: np.ndarray,
         predicted_decrease: float = 1.0,
     ) -> tuple[float, np.ndarray]:
-        """The slope is bracketed once a trial lies behind its zero."""
+        """t and R(u + t w), (U,). The zero of the slope is bracketed once a trial lies behind it."""
         before, low = float(residual @ direction), 0.0
         high, behind = np.inf, np.inf
         slope_low, following = before, 1.0

@@ -10,17 +10,17 @@ from nlsolve.plugin import Globalization, NonlinearProblem, Search
 
 
 class FullSteps(Globalization):
-    """t = 1, whatever becomes of it."""
+    """t = 1 at every step, even where ‖R‖ grows."""
 
     kind: Literal["none"] = "none"
 
     def search(self, problem: NonlinearProblem) -> Search:
-        """Nothing to remember."""
+        """The search of one solve, which remembers nothing."""
         return Full()
 
 
 class Full:
-    """One residual a step."""
+    """t = 1, for one residual a step."""
 
     def length(
         self,

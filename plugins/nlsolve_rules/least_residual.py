@@ -12,7 +12,7 @@ from pydantic import Field
 from nlsolve.plugin import Globalization, NonlinearProblem, Search
 
 SUFFICIENT_DECREASE = 1e-4  # of ‖R‖, as part of the decrease predicted per unit of step length (Armijo 1966)
-OVER = 1e30  # a ratio of residuals above this counts as this: its fourth power is still a number
+OVER = 1e30  # larger ratios of residuals are set to this, so that their fourth power stays finite
 SHORTEST, LONGEST = 0.1, 0.5  # the next length over the last one (Dennis & Schnabel 1983, A6.3.1)
 
 Trials = list[tuple[float, float]]
@@ -26,7 +26,7 @@ class Backtracking(Globalization):
     trials: int = Field(10, gt=0, description="lengths t that may be tried besides the full step")
 
     def search(self, problem: NonlinearProblem) -> Search:
-        """Compared with the last residual alone."""
+        """The search of one solve; a step is compared with the last residual alone."""
         return LeastResidual(self.trials, 1, halved)
 
 
@@ -37,7 +37,7 @@ class NonMonotone(Backtracking):
     memory: int = Field(10, gt=0, description="m, residuals the largest of which a step is compared with")
 
     def search(self, problem: NonlinearProblem) -> Search:
-        """Remembers m residuals."""
+        """The search of one solve; a step is compared with the largest of the last m residuals."""
         return LeastResidual(self.trials, self.memory, halved)
 
 
@@ -47,12 +47,12 @@ class Cubic(Backtracking):
     kind: Literal["cubic"] = "cubic"  # type: ignore[assignment]
 
     def search(self, problem: NonlinearProblem) -> Search:
-        """Compared with the last residual alone."""
+        """The search of one solve; a step is compared with the last residual alone."""
         return LeastResidual(self.trials, 1, interpolated)
 
 
 class LeastResidual:
-    """The search behind all of these; they differ in how many residuals a step is compared with, and in the next t."""
+    """The search of these three; they differ in how many residuals a step is compared with, and in the next t."""
 
     def __init__(self, trials: int, memory: int, shorter: Callable[[Trials, float], float]) -> None:
         self._trials, self._shorter = trials, shorter
@@ -66,7 +66,7 @@ class LeastResidual:
         direction: np.ndarray,
         predicted_decrease: float = 1.0,
     ) -> tuple[float, np.ndarray]:
-        """The first t with enough decrease, else the best of those tried."""
+        """The first t with enough decrease, else the best of those tried; and R(u + t w), (U,)."""
         size = float(np.linalg.norm(residual))
         self._sizes.append(size)
         length, best_length, best_size, best = 1.0, 1.0, np.inf, residual

@@ -29,9 +29,9 @@ class Previous(Predictor):
 
 class Polynomial(Predictor):
     """v_{k+1} = Σ_{i=0..d} (−1)ⁱ C(d+1, i+1) v_{k−i}, of order Δt^(d+1): the polynomial of degree d through the last
-    d + 1 velocities; d = 1 is 2 v_k − v_{k−1}. At the start of a march it goes through those there are.
+    d + 1 velocities; d = 1 is 2 v_k − v_{k−1}. At the start of a march, with fewer velocities, the degree is lower.
 
-    What is not smooth in time, as the operators of moving nodes where neighbours change (see `skin` of the scene), is
+    What is not smooth in time, such as operators of moving nodes where neighbours change (see `skin` in `motion`), is
     amplified by ‖c‖₂: 2.2, 4.4 and 8.3 for d = 1, 2, 3.
     """
 

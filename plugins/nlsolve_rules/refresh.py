@@ -16,7 +16,7 @@ class EveryIteration(RefreshRule):
     kind: Literal["every-iteration"] = "every-iteration"
 
     def due(self, history: TangentHistory) -> bool:
-        """Always."""
+        """True."""
         return True
 
 
@@ -72,7 +72,7 @@ class AverageCost(RefreshRule):
 
     in units of one iteration. While K* ages its average cost falls, for its factorisation is shared by more digits, and
     then rises; it is least where the two sides meet, which is when to replace what wears out (Preinreich 1940). Unlike
-    `cost-optimal` it needs to be told neither how long the march is nor what a new tangent would do.
+    `cost-optimal` it needs neither the length of the march nor the contraction of a new tangent.
     """
 
     kind: Literal["average-cost"] = "average-cost"
@@ -103,5 +103,5 @@ class Never(RefreshRule):
     kind: Literal["never"] = "never"
 
     def due(self, history: TangentHistory) -> bool:
-        """Not once."""
+        """False."""
         return False

@@ -1,4 +1,4 @@
-"""Strategies for R(u) = 0, one method a file; homotopy and the solvers of other packages are packages."""
+"""Methods for R(u) = 0, one in each file; homotopy, Newton-Krylov and solvers of other libraries are packages."""
 
 from __future__ import annotations
 
@@ -38,4 +38,5 @@ METHODS = (
 
 @hookimpl
 def nlsolve_components() -> Iterable[type[Component]]:
+    """The methods of this package."""
     return METHODS

@@ -26,7 +26,7 @@ class Anderson(NonlinearSolver):
     default_refresh: ClassVar = {"kind": "poor-contraction"}
 
     def matrix(self, problem: NonlinearProblem, state: np.ndarray) -> Any:
-        """What is factorised into K*."""
+        """The matrix that is factorised into K*, (U, U)."""
         return problem.jacobian(state)
 
     def steps(self, problem: NonlinearProblem, tangent: KeptTangent, start: np.ndarray) -> Iterator[Step]:

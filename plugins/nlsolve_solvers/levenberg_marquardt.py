@@ -31,7 +31,7 @@ class LevenbergMarquardt(NonlinearSolver):
     shift: float = Field(1e-3, gt=0, description="μ of the first step")
 
     def steps(self, problem: NonlinearProblem, tangent: KeptTangent, start: np.ndarray) -> Iterator[Step]:
-        """The iterates u_0, u_1, …"""
+        """The iterates u_0, u_1, …; raises SolveError (stagnated) as above."""
         state, shift, growth, refused = start, self.shift, 2.0, False
         residual = problem.residual(state)
         yield Step(state)
@@ -49,7 +49,7 @@ class LevenbergMarquardt(NonlinearSolver):
             refused = not gain > ACCEPTED
             if refused:
                 tangent.observe(contraction=max(trial_size / size, 1.0))
-                if renewed:  # else its model may be at fault, which is an older J's
+                if renewed:  # a kept matrix has the model of an older J, which may be at fault
                     shift, growth = shift * growth, 2.0 * growth
                 continue
             shift, growth = shift * max(1.0 / 3.0, 1.0 - (2.0 * gain - 1.0) ** 3), 2.0

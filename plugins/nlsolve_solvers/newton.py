@@ -27,7 +27,7 @@ class Newton(NonlinearSolver):
     def steps_and_residuals(
         self, problem: NonlinearProblem, tangent: KeptTangent, start: np.ndarray
     ) -> Iterator[tuple[Step, np.ndarray]]:
-        """The iterates with R(u_0), R(u_1), …, for a method that judges them."""
+        """The iterates with R(u_0), R(u_1), …, for a method that needs both."""
         search = self.globalization.search(problem)
         state, residual = start, problem.residual(start)
         yield Step(state), residual

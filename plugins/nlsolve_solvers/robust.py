@@ -1,4 +1,4 @@
-"""One method after the other on the same problem, until one of them gets there: a polyalgorithm."""
+"""A polyalgorithm: one method after the other on the same problem, until one of them solves it."""
 
 from __future__ import annotations
 
@@ -12,18 +12,21 @@ from nlsolve.plugin import KeptTangent, NonlinearProblem, NonlinearSolver, Solve
 from nlsolve_solvers.newton import Newton
 from nlsolve_solvers.pseudo_transient import PseudoTransient
 
-FALL = 0.9  # ‖R‖ must fall by this within `patience` steps
+FALL = 0.9  # largest part of ‖R‖ that may be left after `patience` steps
 FAR = 1e3  # largest growth of ‖R‖ that a leap may cause, or that Newton's steps may show before they are given up
-HALVINGS = 30  # of a leap: what needs more has no length
+HALVINGS = 30  # of a leap's step; a shorter one moves nothing
 
 
 class Robust(NonlinearSolver):
-    """Newton's steps with backtracking, which end at a root or where ‖R‖ is least and J nearly singular. From there one
-    leap, a step without regard to descent, which such a J throws far out, and Newton's steps again; at most `leaps`
-    times. Then, from the start, pseudo-transient continuation, until the driver has seen enough. As in the default of
-    NonlinearSolve.jl (Pal et al. 2024) what is tried comes in the order of its cost.
+    """Methods in the order of their cost, as in the default of NonlinearSolve.jl (Pal et al. 2024):
 
-    A method is left when it fails, when ‖R‖ has grown a thousandfold, or has not fallen by a tenth in `patience` steps.
+    1. Newton's steps with backtracking. They end at a root, or at a least point of ‖R‖ where J is nearly singular.
+    2. From there a leap, one step without backtracking, which is long because J is nearly singular; then Newton's steps
+       with backtracking again. At most `leaps` times.
+    3. Pseudo-transient continuation from the start, until the driver stops it.
+
+    Newton's steps are given up when the method fails, when ‖R‖ has grown a thousandfold, or when it has not fallen by a
+    tenth in `patience` steps.
     """
 
     kind: Literal["robust"] = "robust"
@@ -45,15 +48,15 @@ class Robust(NonlinearSolver):
     def _descent(
         self, problem: NonlinearProblem, tangent: KeptTangent, start: np.ndarray
     ) -> Generator[Step, None, np.ndarray]:
-        """Newton's states behind the start, as long as ‖R‖ falls; returns the best of them."""
+        """Newton's states after the start, as long as ‖R‖ falls; returns the one with the least ‖R‖."""
         state, least = start, list[float]()
         try:
             for step, residual in Newton().steps_and_residuals(problem, tangent, start):
                 size = float(np.linalg.norm(residual))
                 if not size <= FAR * min([size, *least[:1]]):
-                    tangent.observe(contraction=FAR)  # the driver is not shown this step and cannot measure it
+                    tangent.observe(contraction=FAR)  # this step is not yielded, so the driver cannot measure it
                     break
-                if least:  # the start has been shown
+                if least:  # the start has been yielded already
                     yield step
                 if size <= min([size, *least[-1:]]):
                     state = step.state
@@ -61,12 +64,15 @@ class Robust(NonlinearSolver):
                 if len(least) > self.patience and not least[-1] <= FALL * least[-1 - self.patience]:
                     break
         except SolveError:
-            return state  # a method that fails is left, not the problem
+            return state  # the next method may still solve the problem
         return state
 
 
 def leap(problem: NonlinearProblem, tangent: KeptTangent, state: np.ndarray) -> np.ndarray | None:
-    """u − t K*⁻¹ R(u) with the largest t = 1, ½, … for which ‖R‖ is finite and at most `FAR` times what it was."""
+    """u − t K*⁻¹ R(u) with the largest t = 1, ½, … for which ‖R‖ is finite and at most `FAR` times what it was.
+
+    None if K* cannot be factorised, or if no t is found.
+    """
     try:
         tangent.refresh_if_due(lambda: problem.jacobian(state))
         residual = problem.residual(state)

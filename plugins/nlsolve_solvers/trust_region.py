@@ -24,7 +24,7 @@ class TrustRegion(NonlinearSolver):
     default_refresh: ClassVar = {"kind": "poor-contraction"}
 
     def steps(self, problem: NonlinearProblem, tangent: KeptTangent, start: np.ndarray) -> Iterator[Step]:
-        """The iterates u_0, u_1, …"""
+        """The iterates u_0, u_1, …; raises SolveError (stagnated) when no step in the smallest region lowers ‖R‖."""
         jacobian, state, radius = cached_jacobian(problem), start, np.inf
         residual = problem.residual(state)
         yield Step(state)

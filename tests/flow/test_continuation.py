@@ -12,7 +12,6 @@ from cases import setup
 from nlsolve_laws import PowerLaw
 from nlsolve_scenes import Channel, StirringTool
 from nlsolve_scenes.nodes.rings import Rings
-from nlsolve_solvers import Newton
 from pydantic import ValidationError
 
 from nlsolve import Status, Study
@@ -195,7 +194,7 @@ def test_the_load_includes_the_force_on_the_body() -> None:
 
 def test_a_start_that_cannot_get_there_is_a_row_with_its_place() -> None:
     start = Start(adaptive=True, smallest=0.5, iterations=2)
-    parts = {"time": TimeSteps(horizon=1e-4), "start": start, "budget": Budget(iterations=50), "starter": Newton()}
+    parts = {"time": TimeSteps(horizon=1e-4), "start": start, "budget": Budget(iterations=50)}
     row = march(setup(StirringTool(nodes=COARSE), 0.1324, **parts)).summary
     assert row["status"] == "budget spent"
     assert "on the way to the first state, at index = 0." in row["message"]

@@ -50,7 +50,7 @@ class Gradient:
 def sparse_rows(blocks: list[list[tuple[np.ndarray, np.ndarray]]], shape: tuple[int, int]) -> Any:
     """CSR matrix of stacked blocks of rows; a block joins (columns, values) pairs, (T, k) each, side by side.
 
-    What only fills up the smaller supports is not stored.
+    The zeros that fill up smaller supports are not stored.
     """
     columns = [np.concatenate([pair[0] for pair in block], axis=1) for block in blocks]
     values = [np.concatenate([pair[1] for pair in block], axis=1) for block in blocks]

@@ -1,4 +1,4 @@
-"""What is found on a cloud before any weight: triangles and supports, kept while its nodes move a little."""
+"""Triangles and supports of a cloud, which are found before any weight and kept while the nodes move a little."""
 
 from __future__ import annotations
 
@@ -17,5 +17,5 @@ class Neighbours:
     supports: dict[str, Supports] = field(default_factory=dict)
 
     def moved_to(self, cloud: Cloud) -> Neighbours:
-        """The same at other places of the nodes; supports follow when their weights are asked for."""
+        """The same neighbours on a cloud whose nodes have moved; supports are updated when weights are computed."""
         return Neighbours(self.triangles.moved_to(cloud), dict(self.supports))

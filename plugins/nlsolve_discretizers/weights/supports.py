@@ -1,4 +1,4 @@
-"""Which of the sources serve a target: the nearest ones, or all within a radius, more where they lie to one side.
+"""The neighbours of each target among the sources: the nearest, or all within a radius; more if they lie on one side.
 
 T targets, S sources, k the largest number of neighbours.
 """
@@ -34,8 +34,10 @@ class Supports:
     def nearest(
         cls, sources: np.ndarray, targets: np.ndarray, count: int | np.ndarray, balanced: bool = False
     ) -> Supports:
-        """The `count` nearest sources, one number or (T,); `balanced` ones grow, to twice that at most, until every
-        quadrant around the target that has a source within REACH is served.
+        """The `count` nearest sources, one number or (T,). `balanced` supports grow, to twice `count` at most, until
+        every quadrant around the target that has a source within REACH holds a neighbour.
+
+        Raises SolveError (bad cloud) if there are too few sources.
         """
         counts = np.broadcast_to(count, len(targets))
         largest = int(np.max(count, initial=1))
@@ -59,7 +61,7 @@ class Supports:
 
     @classmethod
     def _of(cls, distance: np.ndarray, index: np.ndarray, counts: np.ndarray) -> Supports:
-        """From all that a tree found, one more than wanted at least."""
+        """Supports from the sources that a tree found for each target: `counts` neighbours and at least one more."""
         row = np.arange(len(counts))
         farthest, next_one = distance[row, counts - 1], distance[row, counts]
         # On a regular grid the two tie, and a source on the rim would weigh nothing: the rim lies just beyond it.
@@ -98,7 +100,7 @@ def _quadrants(offsets: np.ndarray) -> list[np.ndarray]:
 
 
 def _balanced(offsets: np.ndarray, distance: np.ndarray, counts: np.ndarray) -> np.ndarray:
-    """Counts (T,) that reach the nearest source of every quadrant not yet served, for offsets (T, most, 2)."""
+    """Counts (T,) that include the nearest source of every quadrant, if within REACH, for offsets (T, most, 2)."""
     row = np.arange(len(counts))
     rim = REACH * distance[row, counts - 1]
     needed = counts.copy()

@@ -24,7 +24,7 @@ from nlsolve.plugin import Cloud, PointOperators, SolveError, Status
 class Triangles:
     """Triangles (T, 3) of a cloud, counter-clockwise, without those that span a hole or lie along a wall.
 
-    found : the same triangles on the cloud they were found on, when its nodes have moved since.
+    found : the same triangles on the cloud where they were found; None if its nodes have not moved since.
     """
 
     cloud: Cloud
@@ -33,7 +33,10 @@ class Triangles:
 
     @classmethod
     def of(cls, cloud: Cloud) -> Triangles:
-        """Delaunay's triangulation, less the triangles whose three nodes lie on one and the same boundary."""
+        """Delaunay's triangulation, less the triangles whose three nodes lie on one and the same boundary.
+
+        Raises SolveError (bad cloud) if the nodes lie on one line or a node belongs to no triangle.
+        """
         try:
             corners = Delaunay(cloud.nodes).simplices
         except QhullError as error:
@@ -53,8 +56,8 @@ class Triangles:
         return Triangles(cloud, self.corners, self.found or self)
 
     @property
-    def as_column(self) -> bool:
-        """No triangle has been turned inside out by the motion of its nodes."""
+    def are_upright(self) -> bool:
+        """Whether every triangle is still counter-clockwise: no motion of nodes has turned one inside out."""
         return bool((self.areas > 0.0).all())
 
     @cached_property
@@ -118,7 +121,7 @@ class Triangles:
         return np.unique(self._without_held_patches(patch, beside[inner]), return_inverse=True)[1]
 
     def _without_held_patches(self, patch: np.ndarray, sides: np.ndarray) -> np.ndarray:
-        """Patches whose nodes all lie on walls joined to a neighbour: no unknown could change their dilatation."""
+        """`patch`, with patches whose nodes all lie on walls joined to a neighbour: no unknown moves such nodes."""
         moves = ~self.cloud.on_boundary[self.corners].all(axis=1)
         while True:
             held = np.bincount(patch, moves, len(patch))[patch] == 0.0
@@ -144,7 +147,7 @@ class Triangles:
         return np.bincount(self.corners.ravel(), np.repeat(self.areas / 3.0, 3), len(self.cloud.nodes))
 
     def centroids(self) -> np.ndarray:
-        """(T, 2) [mm]."""
+        """Centroid of each triangle, (T, 2) [mm]."""
         return self.cloud.nodes[self.corners].mean(axis=1)
 
     def diamonds(self) -> tuple[np.ndarray, np.ndarray]:

@@ -1,4 +1,4 @@
-"""Solvers of other packages under the same ledger: residuals and solves they call for are counted like ours."""
+"""Solvers of other libraries under the same ledger: the residuals and solves they ask for are counted like ours."""
 
 from nlsolve_solvers.external.kinsol import Kinsol
 from nlsolve_solvers.external.petsc_snes import PetscSnes

@@ -28,18 +28,18 @@ COUNTERS = {"reported_iterations": "NumNonlinSolvIters", "reported_residuals": "
 
 
 class Kinsol(NonlinearSolver):
-    """newton, line-search : Newton on R(u), with full steps or with backtracking (Dennis & Schnabel 1983); K* is wanted
-                             set up at the first iteration of a run and then every `setup_interval`.
-    picard :                 u ← u − K*⁻¹ R(u) with K* wanted set up at each iteration, Anderson's mixing over `depth`.
-    fixed-point :            the same with K* wanted set up at the beginning of a run only.
+    """newton, line-search : Newton on R(u), with full steps or with backtracking (Dennis & Schnabel 1983); K* is asked
+                             for at the first iteration of a run and then every `setup_interval`.
+    picard :                 u ← u − K*⁻¹ R(u), K* asked for at each iteration, Anderson's mixing over `depth`.
+    fixed-point :            the same, K* asked for at the beginning of a run only.
 
-    Whether K* is then factorised anew is for the refresh rule to say, which is told the contraction per solve with K*.
-    KINSOL has no place for a linear solver of ours, but for a preconditioner: linear = "direct" is one step of its
+    The refresh rule, which is told the contraction per solve with K*, decides whether K* is then factorised anew.
+    KINSOL does not take a linear solver of ours, but takes a preconditioner: linear = "direct" is one step of its
     flexible GMRES on K* itself, of which K*⁻¹ is the exact preconditioner; "gmres" works on J(u), to the tolerance of
     Eisenstat & Walker (1996), choice 2.
 
     One run is one step: until ‖R‖₂ ≤ `tolerance` · scale and a tenth of its first value, or until `iterations` are used
-    up. As KINSOL looks at the largest entry of R alone, it is handed R = 0 from there on.
+    up. KINSOL tests the largest entry of R alone, so it is handed R = 0 from there on.
     """
 
     kind: Literal["kinsol"] = "kinsol"
@@ -52,7 +52,7 @@ class Kinsol(NonlinearSolver):
     iterations: int = Field(50, gt=0, description="of KINSOL in one run")
 
     def steps(self, problem: NonlinearProblem, tangent: KeptTangent, start: np.ndarray) -> Iterator[Step]:
-        """The start, and the ends of the runs."""
+        """The start, and the ends of the runs. Raises SolveError (not applicable) if sundials4py is not installed."""
         if kinsol is None:
             raise SolveError(Status.NOT_APPLICABLE, WAY_OUT)
         direct = self.linear == "direct" or self.strategy == "picard"
@@ -65,10 +65,10 @@ class Kinsol(NonlinearSolver):
         )
 
     def _run(self, served: Served, start: np.ndarray) -> Ending:
-        """One call of KINSOL."""
+        """One call of KINSOL, from `start` (U,)."""
         calls = _Calls(served)
         context = core.SUNContext_Create(core.SUN_COMM_NULL)[1]
-        core.SUNContext_ClearErrHandlers(context)  # which print; the flag that KINSOL returns says as much
+        core.SUNContext_ClearErrHandlers(context)  # they print; the flag that KINSOL returns says the same
         view = kinsol.KINCreate(context)
         memory = view.get()
         u, ones = (core.N_VMake_Serial(len(start), values, context) for values in (start.copy(), np.ones(len(start))))
@@ -97,8 +97,8 @@ class Kinsol(NonlinearSolver):
 
 
 class _Calls:
-    """What KINSOL calls: vectors in, vectors filled, and a number back: 0, −1 for an exception, or 1 for what is not
-    finite, upon which KINSOL tries a shorter step. It does not look for that itself, and would search for ever.
+    """The callbacks of KINSOL. Each fills a vector and returns 0, or −1 after an exception; `residual` returns 1 where
+    R is not finite, and KINSOL then tries a shorter step. It does not test for that itself and would search for ever.
     """
 
     def __init__(self, served: Served) -> None:

@@ -28,15 +28,15 @@ EVENTS = {
     "reported_factorizations": "PCSetUp",
     "reported_triangular_solves": "PCApply",
 }
-"""SNES has public counters for the rest; these are of PETSc's own log."""
+"""Counters that are read from PETSc's own log; for the others SNES has public functions."""
 
 
 class Snes:
-    """SNES on U unknowns. It outlives its runs, as one that is used in a march does: lags may persist.
+    """SNES on U unknowns. It is kept from run to run, as in a march, so that lags may persist.
 
     with_matrix : its function is R(u), its Jacobian J, its preconditioner K*; else its function is K*⁻¹ R(u).
     radius : Δ over ‖u‖ where a run of newtontr begins.
-    options : in PETSc's words.
+    options : by PETSc's names for them, without a prefix.
     """
 
     def __init__(self, size: int, with_matrix: bool, radius: float, options: Mapping[str, Any]) -> None:
@@ -62,7 +62,7 @@ class Snes:
             del table[name]
 
     def run(self, served: Served, start: np.ndarray) -> Ending:
-        """One SNESSolve."""
+        """One SNESSolve from `start` (U,). Raises what a callback of ours has raised."""
         self._calls.served = served
         self._u.setArray(start)
         if hasattr(self._snes, "setTRTolerances"):  # Δ is a length there; in PETSc 3.18 it is relative, as here
@@ -70,7 +70,7 @@ class Snes:
         before = _log()
         try:
             self._snes.solve(None, self._u)
-        except Exception:  # PETSc's own, or its wrapping of what a callback of ours raised, which is raised below
+        except Exception:  # PETSc's own error, or its wrapping of what a callback of ours raised, which is raised below
             if served.error is None:
                 raise
         finally:
@@ -98,7 +98,7 @@ def _log() -> dict[str, float]:
 
 
 class _Calls:
-    """What SNES calls. It is apart from `Snes` so that no circle leads through PETSc, which no collector sees."""
+    """The callbacks of SNES, apart from `Snes`: Python never collects a reference cycle through PETSc."""
 
     def __init__(self, with_matrix: bool) -> None:
         self._with_matrix = with_matrix

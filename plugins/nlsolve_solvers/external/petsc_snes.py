@@ -23,9 +23,9 @@ FIRST_FORCING, GAMMA, LARGEST, POWER, REMEMBERED = 0.1, 0.9, 0.9, 2.0, 0.1  # ch
 
 
 class PetscSnes(NonlinearSolver):
-    """newtonls, newtontr : Newton on R(u) with a line search or a trust region. Its Jacobian is K*, which SNES wants
-                            set up every `lag` iterations, counted on from run to run if it `persists`; the refresh
-                            rule says whether K* is then factorised anew. With linear = "gmres" its Jacobian is J(u),
+    """newtonls, newtontr : Newton on R(u) with a line search or a trust region. Its Jacobian is K*, which SNES asks
+                            for every `lag` iterations, counted on from run to run if it `persists`; the refresh rule
+                            decides whether K* is then factorised anew. With linear = "gmres" its Jacobian is J(u),
                             K* the preconditioner, and flexible GMRES ends by choice 2 of Eisenstat & Walker (1996).
     anderson, ngmres, qn :  on K*⁻¹ R(u); the refresh rule is asked at the beginning of each run.
 
@@ -49,7 +49,7 @@ class PetscSnes(NonlinearSolver):
     iterations: int = Field(50, gt=0, description="of SNES in one run")
 
     def steps(self, problem: NonlinearProblem, tangent: KeptTangent, start: np.ndarray) -> Iterator[Step]:
-        """The start, and the ends of the runs."""
+        """The start, and the ends of the runs. Raises SolveError (not applicable) if petsc4py is not installed."""
         if PETSc is None:
             raise SolveError(Status.NOT_APPLICABLE, WAY_OUT)
         direct = self.method == "newtonls" and self.linear == "preonly"
@@ -66,7 +66,7 @@ class PetscSnes(NonlinearSolver):
         return self.method in ("newtonls", "newtontr")
 
     def _snes_beside(self, tangent: KeptTangent, size: int) -> Snes:
-        """The SNES that lives as long as this tangent: a march is one use of it."""
+        """The SNES that is kept as long as this tangent, which is for one march."""
         key = self.model_dump_json()
         kept = _kept.get(tangent)
         if kept is None or kept[0] != key or kept[1].size != size:

@@ -17,12 +17,12 @@ MATRIX_IS_ONE = -1.0  # `alpha`: SciPy's methods begin with the Jacobian −1/α
 
 class ScipyRoot(NonlinearSolver):
     """y begins at 0; the residual is the true one, and each value of F costs one solve and one residual. Without
-    `precondition` F = R, as a caller of SciPy would have it who has no matrix. hybr needs a dense Jacobian, which it
+    `precondition` F = R, as for a caller of SciPy without a matrix. hybr needs a dense Jacobian, which it
     makes of U differences of F, or is given: U products with J, and as many solves.
 
     `root` does not hand over its iterates as they come, so one run of it is one step: until ‖F‖₂ ≤ `tolerance` · scale
     and a tenth of its first value (hybr: until y changes by less than `tolerance`), or until `iterations` are used up.
-    Then the refresh rule is asked, having been told the contraction per value of F, and the next run begins here.
+    Then the refresh rule is told the contraction per value of F and is asked, and the next run begins here.
     """
 
     kind: Literal["scipy-root"] = "scipy-root"
@@ -34,7 +34,7 @@ class ScipyRoot(NonlinearSolver):
     default_refresh: ClassVar = {"kind": "poor-contraction"}
 
     def steps(self, problem: NonlinearProblem, tangent: KeptTangent, start: np.ndarray) -> Iterator[Step]:
-        """The start, and the ends of the runs."""
+        """The start, and the ends of the runs. Raises SolveError (stagnated) if a step or pivot of SciPy vanishes."""
         state, known = start, [problem.residual(start)]
         size = float(np.linalg.norm(known[0]))
         goal = self.tolerance * problem.scale(start)
@@ -98,6 +98,6 @@ class ScipyRoot(NonlinearSolver):
 
 
 def reported(found: Any) -> dict[str, float]:
-    """What SciPy says it did; no method says all of it."""
+    """SciPy's counters, by the names of our columns; no method of SciPy has all of them."""
     counters = {"reported_iterations": "nit", "reported_residuals": "nfev", "reported_jacobians": "njev"}
     return {name: found[counter] for name, counter in counters.items() if counter in found}

@@ -14,12 +14,12 @@ LEAST_GAIN = 0.1  # each run goes on until this part of the residual it began wi
 
 
 class Served:
-    """What one run works with, and what was found on the way.
+    """The callbacks of one run, and what has been found so far.
 
     goal : ‖R‖₂ at which the run may end: the one given, and a tenth of the first ‖R‖₂.
-    direct : whether the library shall take K* for its Jacobian, as with a factorised one, or multiply with J(u).
-    contraction : per solve with K*, what the refresh rule was last told; None before there was a solve.
-    error : what a callback raised. An exception does not find its way through a library, so it waits here.
+    direct : True if K* stands for the Jacobian of the library, as a factorised one does; False if that is J(u).
+    contraction : per solve with K*, as the refresh rule was last told; None before the first solve.
+    error : what a callback raised. An exception cannot pass through a library, so it is kept here.
     """
 
     def __init__(
@@ -37,7 +37,7 @@ class Served:
         self._state = start
 
     def guarded(self, callback: Callable[[], None]) -> int:
-        """Zero, or −1 with the exception kept: how C is told."""
+        """Call `callback`. Returns 0, or −1 with the exception kept in `error`, as a library in C expects it."""
         try:
             callback()
         except BaseException as error:
@@ -69,21 +69,21 @@ class Served:
         return self.size(u) <= self.goal
 
     def renew(self, u: np.ndarray) -> None:
-        """The library wants its matrix set up at u: the refresh rule decides, told of the contraction since then."""
+        """The library asks for K* at u: the refresh rule is told the contraction since it last asked, and decides."""
         self.observe(u)
         self._state = self._at_tangent = u.copy()
         self._solves = 0
         self._tangent.refresh_if_due(lambda: self._jacobian(u))
 
     def observe(self, u: np.ndarray) -> None:
-        """Tell the refresh rule what each solve with K* has left, at u, of the residual since K* was asked for."""
+        """Tell the refresh rule the contraction per solve with K*, from where K* was last asked for to u."""
         if self._at_tangent is not None and self._solves:
             before = self.size(self._at_tangent)
             self.contraction = (self.size(u) / before) ** (1.0 / self._solves) if before else 0.0
             self._tangent.observe(contraction=self.contraction)
 
     def linearize(self, u: np.ndarray) -> None:
-        """J is wanted at u from now on."""
+        """From now on products are with J(u)."""
         self._state = u.copy()
 
     def solve(self, b: np.ndarray) -> np.ndarray:
@@ -108,8 +108,8 @@ class Served:
 class Ending:
     """Where a run ended.
 
-    gave_up : why the library gave up, in its word; empty when it came to the goal or used up its iterations.
-    reported : what the library says it did, by the names of the columns.
+    gave_up : why the library gave up, in its own word; empty if it reached the goal or used up its iterations.
+    reported : the library's own counters, by the names of our columns.
     """
 
     state: np.ndarray
@@ -125,11 +125,11 @@ def runs(
 ) -> Iterator[Step]:
     """The start, and the ends of the runs, each from the end of the one before.
 
-    serve : what a run from this state works with.
-    set_up_first : whether K* is wanted before the library begins, which then does not ask for it.
+    serve : gives the callbacks of a run from a state.
+    set_up_first : whether the refresh rule is asked for K* before each run, for a library that does not ask for K*.
 
-    A run that gives up where it began is followed by another one, before which the refresh rule may want another K*.
-    Raises SolveError (stagnated) when that one gives up there too.
+    A run that gives up where it began is followed by another one, before which the refresh rule may renew K*. Raises
+    SolveError (stagnated) if that one gives up there too.
     """
     state, stuck = start, False
     yield Step(state)

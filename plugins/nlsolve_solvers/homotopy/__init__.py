@@ -1,4 +1,4 @@
-"""The asymptotic numerical method: a homotopy, a series with one kept K*, and a range. One choice a file."""
+"""The asymptotic numerical method: a homotopy, a series with one kept K*, and a range; one file for each choice."""
 
 from nlsolve_solvers.homotopy.method import AsymptoticNumericalMethod
 

@@ -1,4 +1,4 @@
-"""W(a) around one state: the terms computed so far, and what the extrapolations and the range rules look at."""
+"""W(a) around one state: the terms computed so far, and what extrapolations and range rules need of them."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ class Branch:
         return series(order) if self.kind == "series" else extrapolate(self.kind, self.columns[:, :order])
 
     def has_pole(self) -> bool:
-        """Whether a Padé was wanted and the series is used instead, for a pole on the path."""
+        """Whether the series is used in place of a Padé, which has a pole on the path."""
         return self.kind != "series" and len(self.extrapolation().denominator) == 1
 
     def increment(self, a: float) -> np.ndarray:

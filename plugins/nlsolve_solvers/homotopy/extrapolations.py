@@ -36,7 +36,7 @@ class Extrapolation:
         return roots[np.argsort(np.abs(roots))]
 
     def is_clear(self) -> bool:
-        """No pole on the path 0 < a ≤ 1, nor just behind its end."""
+        """Whether no pole lies on the path 0 < a ≤ 1 or just behind its end."""
         poles = self.poles()
         return not (np.abs(np.angle(poles)) <= REAL)[np.abs(poles) <= ON_THE_PATH].any()
 
@@ -56,7 +56,7 @@ def pade(columns: np.ndarray, m: int) -> Extrapolation:
 
     What the least squares leave of these N_k is kept, so that the approximant agrees with the series to order p.
     columns : the W_j, shape (p, p) or (U, p). Order k is divided by ρ^k, ρ the mean growth of the W_j, so that all
-    orders speak alike. m is lowered to the rank of the fit: terms that depend on each other would admit any pole.
+    orders weigh alike. m is lowered to the rank of the fit: terms that depend on each other would admit any pole.
     Exact for a rational W(a) whose denominator and numerator have degrees ≤ m.
     """
     p = columns.shape[1]

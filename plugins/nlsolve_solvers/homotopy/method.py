@@ -25,13 +25,13 @@ FIRST_CHECK = 3  # terms before an adaptive series asks for its range: W_2 may v
 class AsymptoticNumericalMethod(NonlinearSolver):
     """K* W_j = r_j for j = 1 … p, one kept K* for all orders; then a state W(a), a ≤ min(1, a_max).
 
-    Choices, each alone: the form of the homotopy (and so of r_j), how W(a) is made of the W_j, the rule for its range
-    a_max, whether p is a number or found as the series goes, whether η is a number or what a wanted residual asks for,
-    and Newton corrections at the end of the path.
+    Choices, each independent of the others: the form of the homotopy (and so of r_j), how W(a) is made of the W_j, the
+    rule for its range a_max, whether p is a number or found as the series goes, whether η is a number or what a wanted
+    residual asks for, and Newton corrections at the end of the path.
     a_max ≥ 1: W(1) is the solution and K* is kept. a_max < 1: the refresh rule may renew K* here and the series is
     computed again; with a K* that is already new, the state advances to W(a_max) and a branch begins there. Each branch
     that is used says what limited its range (`limited_by` in `steps`).
-    The defaults are the method of the 2015 paper, its range guarded.
+    The defaults are the method of the 2015 paper, but its range looks at two terms instead of one (`ratio`).
 
     An adaptive series stops at the first order with a_max ≥ 1, or where one more order costs more, by the range it
     adds, than a new branch does: in units of one order a branch of p orders costs c + p and advances a_max, so where
@@ -72,7 +72,7 @@ class AsymptoticNumericalMethod(NonlinearSolver):
     claims: ClassVar[bool] = True
 
     def steps(self, problem: NonlinearProblem, tangent: KeptTangent, start: np.ndarray) -> Iterator[Step]:
-        """The ends of the branches, and of their corrections."""
+        """The start, the ends of the branches, and their corrections. Raises SolveError (range exhausted)."""
         state = start
         goal = None if self.residual is None else self.residual * problem.scale(start)
         yield Step(state)
@@ -103,8 +103,8 @@ class AsymptoticNumericalMethod(NonlinearSolver):
     def _branch(
         self, problem: NonlinearProblem, tangent: KeptTangent, state: np.ndarray, goal: float | None
     ) -> tuple[Branch, float, str]:
-        """W_1 … W_p around `state`, a_max, and what limited it. The refresh rule is told a_max, and the contraction by
-        order, which is what K* can be held responsible for.
+        """W_1 … W_p around `state`, a_max, and what limited it. The refresh rule is told a_max, and the contraction per
+        order, which is what K* decides.
         """
         branch, rule = Branch(problem, state, self.form, self.extrapolation), RULES[self.range]
         reaches: list[float] = []

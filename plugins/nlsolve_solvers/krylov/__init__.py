@@ -1,4 +1,4 @@
-"""Newton-Krylov: how well a Newton equation is solved, by GMRES, and how well it is worth solving."""
+"""Newton-Krylov: GMRES for a Newton equation, and the forcing terms, how well the equation is worth solving."""
 
 from nlsolve_solvers.krylov.newton_krylov import NewtonKrylov
 

@@ -5,10 +5,10 @@ by, ‖M⁻¹ (b − A x)‖, at two solves and a product more; its `gcrotmk` pr
 inexact Newton method needs
 
 - preconditioning on the right, so that ‖b − A x‖ itself is minimised and compared with the forcing term;
-- x = Z y from the directions z_k = M⁻¹ v_k as they were stored, without a further solve, and right also where M changes
-  from one to the next, as an M that iterates does;
-- ‖b − A x‖ and the dimension as results: the next forcing term is made of the one, and of both the contraction per
-  solve, by which the refresh rule judges K*.
+- x = Z y from the directions z_k = M⁻¹ v_k as they were stored, without a further solve, and correct also where M
+  changes from one to the next, as an M that iterates does;
+- ‖b − A x‖ and the dimension as results: the former gives the next forcing term, both give the contraction per solve,
+  by which the refresh rule judges K*.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ Map = Callable[[np.ndarray], np.ndarray]
 
 @dataclass(frozen=True)
 class Krylov:
-    """What GMRES found.
+    """The result of GMRES.
 
     solution : x, shape (U,).
     left : ‖b − A x‖₂.
@@ -41,6 +41,7 @@ def gmres(product: Map, precondition: Map, b: np.ndarray, tolerance: float, most
     """x with ‖b − A x‖ ≤ tolerance, or the best of `most` dimensions; b ≠ 0.
 
     Preconditioned on the right, the residual that is minimised is the true one, and x = Z y needs no further solve.
+    Raises SolveError (not finite) if a product is not finite.
     """
     size = left = float(np.linalg.norm(b))
     basis, directions = np.empty((most + 1, len(b))), np.empty((most, len(b)))

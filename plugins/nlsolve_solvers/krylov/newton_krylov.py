@@ -20,7 +20,7 @@ class NewtonKrylov(NonlinearSolver):
     which is told that the decrease predicted along w is 1 − ‖R + J w‖/‖R‖ only.
 
     J w comes from the assembled Jacobian, or without one from the residual's own series: [R(u + a w)]_1. The refresh
-    rule is told the contraction per inner iteration: that is what K* can be held responsible for.
+    rule is told the contraction per inner iteration, which is what K* decides.
     """
 
     kind: Literal["newton-krylov"] = "newton-krylov"

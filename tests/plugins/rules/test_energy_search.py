@@ -104,8 +104,8 @@ def test_the_whole_march_from_rest_without_continuation() -> None:
     """A steady case whose starting law is the Newtonian one alone, on the conservative forms."""
     for discretizer in (LinearTriangles(), MovingLeastSquares(form="conservative")):
         scene = StirringTool(nodes=Rings(spacing=0.5))
-        parts: dict[str, Any] = {"discretizer": discretizer, "start": AT_ONCE}
-        row = march(setup(scene, 0.1324, solver=ENERGY, start=Start(solver=ENERGY), **parts)).summary
+        parts: dict[str, Any] = {"discretizer": discretizer, "start": AT_ONCE.with_(solver=ENERGY)}
+        row = march(setup(scene, 0.1324, solver=ENERGY, **parts)).summary
         assert row["status"] == "converged", row["message"]
         assert row["start_factorizations"] == 1
 
