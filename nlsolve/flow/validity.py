@@ -59,7 +59,9 @@ class Limit:
 LIMITS: dict[str, Limit] = {
     "audit.inertia": Limit(0.05, "inertia is not negligible: set physics.inertia = true"),
     "audit.convection": Limit(0.05, "convection is not negligible: set physics.convection = true"),
-    "audit.compressibility": Limit(0.05, "the material is compressed: raise the penalty, or ask for a divergence"),
+    "audit.compressibility": Limit(
+        0.05, "the material is compressed: raise the penalty, or set physics.divergence_tolerance"
+    ),
     "audit.regularization_strain": Limit(0.02, "the regularization rules much of the flow: lower law.regularization"),
     "audit.residual": Limit(1e-5, "the residual is not small beside the stresses: tighten stop.tolerance"),
     "audit.balance": Limit(0.2, "the stresses are not in balance between the points: choose a finer or evener spacing"),
