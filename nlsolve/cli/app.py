@@ -34,6 +34,7 @@ from nlsolve.running.forecast import ASSUMPTION, forecast
 from nlsolve.running.runner import run as run_study
 from nlsolve.running.store import StoreError, read_tables
 from nlsolve.show.tables import build
+from nlsolve.study.case import section_rows
 from nlsolve.study.study import Study
 from nlsolve.study.sweeps import parse_assignments
 
@@ -144,8 +145,9 @@ def diagnose(study: StudyFile, settings: Settings = None, quick: Quick = False, 
 
 @app.command()
 def plugins(as_json: Json = False) -> None:
-    """List what is installed: kind by kind, from where, with parameters, and what failed to load."""
-    rows = load_registry().plugins()
+    """List the sections of a study and what is installed for them, with parameters, and what failed to load."""
+    registry = load_registry()
+    rows = [*section_rows(registry), *registry.plugins()]
     if as_json:
         typer.echo(json.dumps(to_jsonable_python([asdict(row) for row in rows])))
         return

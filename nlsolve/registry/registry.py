@@ -249,7 +249,7 @@ class Registry:
             self._offers.items(), key=lambda item: (order.index(item[0][0]), item[0][1])
         ):
             failure = self.complaint(noun, kind)
-            rows += [PluginRow(noun, kind, offer.source, _parameters(offer.cls), failure) for offer in offers]
+            rows += [PluginRow(noun, kind, offer.source, parameters_of(offer.cls), failure) for offer in offers]
         return rows + self._failures
 
 
@@ -274,7 +274,8 @@ def _checked(cls: Any) -> type[Component]:
     return cls
 
 
-def _parameters(cls: type[Component]) -> tuple[Parameter, ...]:
+def parameters_of(cls: type[Component]) -> tuple[Parameter, ...]:
+    """The fields of a class of components, without its kind."""
     return tuple(_parameter(name, info) for name, info in cls.model_fields.items() if name != "kind")
 
 

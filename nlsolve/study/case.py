@@ -18,7 +18,7 @@ from nlsolve.contracts.rules.refresh import RefreshRule
 from nlsolve.contracts.scene import Misfit, Scene, Section
 from nlsolve.registry.component_tables import ComponentTable, class_name
 from nlsolve.registry.problems import ABSENT, Problem, problems_in, unknown
-from nlsolve.registry.registry import CONTRACTS, Registry
+from nlsolve.registry.registry import CONTRACTS, PluginRow, Registry, parameters_of
 from nlsolve.results.parameters import names_settings
 from nlsolve.solving.stopping import Budget, StoppingTest
 from nlsolve.study.sweeps import Document, Point, leaves
@@ -75,16 +75,16 @@ class Composer:
     def __init__(self, registry: Registry, document: Document) -> None:
         self.registry = registry
         self._models: dict[type[Component], type[BaseModel]] = {}
-        self._all: dict[str, Section] = {}
+        self.all_sections: dict[str, Section] = {}
         for scene in (*registry.classes(Scene.noun).values(), *classes_in(document)):
             if issubclass(scene, Scene):
-                self._all |= sections_of(scene)
-        self._all |= COMMON
+                self.all_sections |= sections_of(scene)
+        self.all_sections |= COMMON
 
     @property
     def sections(self) -> tuple[str, ...]:
         """Names of the sections that cases of any known scene may have; only their parameters can be swept."""
-        return (Scene.noun, *self._all)
+        return (Scene.noun, *self.all_sections)
 
     def case(self, document: Document, points: Sequence[Point]) -> Case:
         """The case of a document to which the values of `points`, one of each sweep, are assigned. Raises Invalid."""
@@ -108,7 +108,7 @@ class Composer:
         if issubclass(scene, Scene):
             sections = sections_of(scene)
         elif scene is Component:  # nobody knows what it needs: the mistakes in all there might be are told
-            sections = self._all
+            sections = self.all_sections
         else:  # an instance of another contract
             sections = {}
             document = {Scene.noun: document[Scene.noun]}
@@ -117,7 +117,7 @@ class Composer:
             raise Invalid(
                 [
                     Problem((name,), ABSENT, f"the scene {scene.kind_name()!r} has no such section: leave it out")
-                    if name in self._all
+                    if name in self.all_sections
                     else unknown((name,), ABSENT, "no such section", self.sections)
                     for name in needless
                 ]
@@ -196,6 +196,26 @@ def classes_in(document: Any) -> Iterator[type[Component]]:
 def sections_of(scene: type[Scene]) -> dict[str, Section]:
     """The sections of a class of scenes, by name: those it declares, and those of `COMMON` that it does not replace."""
     return {**scene.sections, **{name: scene.sections.get(name, section) for name, section in COMMON.items()}}
+
+
+def section_rows(registry: Registry) -> list[PluginRow]:
+    """A row for each section that has no kinds, with its fields and the scenes that ask for it."""
+    scenes = registry.classes(Scene.noun)
+    askers: dict[str, list[str]] = {}
+    for kind, scene in scenes.items():
+        for name in sections_of(scene) if issubclass(scene, Scene) else ():
+            askers.setdefault(name, []).append(kind)
+    found = Composer(registry, {}).all_sections
+    return [
+        PluginRow(
+            name,
+            "",
+            f"nlsolve, for {'every scene' if len(askers[name]) == len(scenes) else ', '.join(askers[name])}",
+            parameters_of(section.contract),
+        )
+        for name, section in found.items()
+        if name in askers and section.contract not in CONTRACTS.values()
+    ]
 
 
 def _plain(value: Any) -> Any:

@@ -194,5 +194,14 @@ def test_plugins_and_why_one_failed(monkeypatch):
     assert rows[-1]["source"] == "broken 0.1"
 
 
+def test_plugins_lists_the_fields_of_sections_without_kinds(monkeypatch):
+    monkeypatch.setattr("nlsolve.cli.app.load_registry", registry_of)
+    rows = {row["noun"]: row for row in json.loads(nlsolve("plugins", "--json").stdout) if not row["kind"]}
+    assert set(rows) == {"physics", "time", "motion", "start", "record", "stop", "budget"}
+    assert rows["time"]["source"] == "nlsolve, for every scene"
+    assert [field["name"] for field in rows["time"]["parameters"]] == ["horizon", "increment"]
+    assert "divergence_tolerance" in nlsolve("plugins").stdout
+
+
 def test_version():
     assert nlsolve("--version").stdout == f"nlsolve {version('nlsolve')}\n"
