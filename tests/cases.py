@@ -16,9 +16,22 @@ from nlsolve_solvers import Newton
 
 from nlsolve.contracts.continuum.geometry import Geometry
 from nlsolve.contracts.outcome import Outcome
+from nlsolve.flow.continuation import Start
 from nlsolve.flow.momentum import Flow
-from nlsolve.flow.state import FlowParts
-from nlsolve.plugin import LinearSolver, NonlinearProblem, NonlinearSolver, RefreshRule, Scene
+from nlsolve.plugin import (
+    ConstitutiveLaw,
+    Discretizer,
+    LinearSolver,
+    NodeMotion,
+    NonlinearProblem,
+    NonlinearSolver,
+    Physics,
+    Predictor,
+    Recording,
+    RefreshRule,
+    Scene,
+    TimeSteps,
+)
 from nlsolve.series import Array
 from nlsolve.solving.driver import solve
 from nlsolve.solving.ledger import Ledger
@@ -60,7 +73,28 @@ def run(
     return solve(problem, solver, tangent, start, test, Budget(iterations=iterations), ledger), ledger
 
 
-def setup(scene: Geometry, index: float = 0.5, **parts: Any) -> FlowParts:
+@dataclass(frozen=True)
+class FlowCase:
+    """The components of a flow by the names of their sections, with the defaults of a study."""
+
+    scene: Geometry
+    law: ConstitutiveLaw
+    discretizer: Discretizer
+    linear: LinearSolver
+    solver: NonlinearSolver
+    refresh: RefreshRule
+    predictor: Predictor
+    error_estimator: Discretizer | None = None
+    physics: Physics = field(default_factory=Physics)
+    time: TimeSteps = field(default_factory=TimeSteps)
+    motion: NodeMotion = field(default_factory=NodeMotion)
+    start: Start = field(default_factory=Start)
+    stop: StoppingTest = field(default_factory=StoppingTest)
+    budget: Budget = field(default_factory=Budget)
+    record: Recording = field(default_factory=Recording)
+
+
+def setup(scene: Geometry, index: float = 0.5, **parts: Any) -> FlowCase:
     """A case of a flow: Newton on the default discretisation, but for the parts given."""
     given: dict[str, Any] = {
         "law": PowerLaw(index=index, regularization=1e-3),
@@ -71,7 +105,7 @@ def setup(scene: Geometry, index: float = 0.5, **parts: Any) -> FlowParts:
         "predictor": Previous(),
         "stop": StoppingTest(tolerance=1e-10),
     }
-    return FlowParts(scene=scene, **(given | parts))
+    return FlowCase(scene=scene, **(given | parts))
 
 
 @dataclass(frozen=True)

@@ -8,11 +8,11 @@ from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
 import pandas as pd
+from cases import FlowCase
 from pydantic import Field
 from scipy.sparse import csc_array
 
 from nlsolve import Outcome, Status
-from nlsolve.flow.state import FlowParts
 from nlsolve.plugin import (
     Cloud,
     Component,
@@ -226,7 +226,7 @@ def write_study(folder: Path, *changes: tuple[str, str], text: str = STUDY) -> P
 
 
 def fake_march(
-    parts: FlowParts, listen: Callable[[Progress], None] | None = None, clock: Callable[[], float] | None = None
+    parts: FlowCase, listen: Callable[[Progress], None] | None = None, clock: Callable[[], float] | None = None
 ) -> Record:
     """A record whose numbers follow from the solver's parameters."""
     order, tolerance = getattr(parts.solver, "order", 1), getattr(parts.solver, "tolerance", 1.0)

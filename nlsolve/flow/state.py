@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -14,37 +13,31 @@ from nlsolve.contracts.continuum.geometry import Geometry
 from nlsolve.contracts.continuum.law import ConstitutiveLaw, rate_squared
 from nlsolve.contracts.continuum.terms import NodeMotion, Physics, Recording, TimeSteps
 from nlsolve.contracts.linear_solver import LinearSolver
-from nlsolve.contracts.nonlinear_solver import NonlinearSolver
 from nlsolve.contracts.rules.predictor import Predictor
-from nlsolve.contracts.rules.refresh import RefreshRule
 from nlsolve.contracts.scene import Entry
 from nlsolve.flow.continuation import Start
 from nlsolve.flow.momentum import Convection, Flow, Inertia
 from nlsolve.flow.moving_nodes import MovingNodes
 from nlsolve.flow.observables import discretization_error
 from nlsolve.series import Array
-from nlsolve.solving.stopping import Budget, StoppingTest
+from nlsolve.solving.stopping import Budget
 
 
-@dataclass(frozen=True)
-class FlowParts:
-    """The components of a flow by the names of their sections, with the defaults of a study."""
+class FlowParts(Protocol):
+    """The components of a flow by the names of their sections, as `FlowScene.sections` declares them."""
 
     scene: Geometry
     law: ConstitutiveLaw
     discretizer: Discretizer
+    error_estimator: Discretizer | None
     linear: LinearSolver
-    solver: NonlinearSolver
-    refresh: RefreshRule
     predictor: Predictor
-    error_estimator: Discretizer | None = None
-    physics: Physics = field(default_factory=Physics)
-    time: TimeSteps = field(default_factory=TimeSteps)
-    motion: NodeMotion = field(default_factory=NodeMotion)
-    start: Start = field(default_factory=Start)
-    stop: StoppingTest = field(default_factory=StoppingTest)
-    budget: Budget = field(default_factory=Budget)
-    record: Recording = field(default_factory=Recording)
+    physics: Physics
+    time: TimeSteps
+    motion: NodeMotion
+    start: Start
+    budget: Budget
+    record: Recording
 
 
 class FlowState:

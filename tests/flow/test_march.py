@@ -10,7 +10,7 @@ import agreement
 import numpy as np
 import pandas as pd
 import pytest
-from cases import setup
+from cases import FlowCase, setup
 from nlsolve_discretizers import LinearTriangles, MovingLeastSquares
 from nlsolve_laws import PowerLaw
 from nlsolve_rules import Cubic, Energy, FullSteps, NonMonotone
@@ -25,7 +25,6 @@ from pydantic import ValidationError
 
 from nlsolve import SolveError, Status
 from nlsolve.flow.continuation import Start
-from nlsolve.flow.state import FlowParts
 from nlsolve.plugin import Cloud, NodeMotion, Operators, Physics, Recording, Step, TimeSteps
 from nlsolve.results.columns import FIELDS, RUNS, STEPS
 from nlsolve.solving.simulate import Progress, Record
@@ -39,7 +38,7 @@ DT = 1e-4
 FIXED = NodeMotion()
 
 
-def marching(steps: int, index: float = 0.5, increment: float = DT, **parts: Any) -> FlowParts:
+def marching(steps: int, index: float = 0.5, increment: float = DT, **parts: Any) -> FlowCase:
     """A spin marched for some increments, on nodes that move with the material but for the parts given."""
     time = TimeSteps(horizon=steps * increment, increment=increment)
     moving = {"time": time, "motion": NodeMotion(nodes="lagrangian")}
@@ -112,7 +111,7 @@ class Watched(Newton):
 BEGUN: list[np.ndarray] = []
 
 
-def guesses(case: FlowParts, **start: Any) -> list[np.ndarray]:
+def guesses(case: FlowCase, **start: Any) -> list[np.ndarray]:
     """Where the case's own method began."""
     BEGUN.clear()
     watched = replace(case, solver=Watched(), start=Start(**start))
