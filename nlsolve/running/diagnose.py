@@ -10,6 +10,7 @@ from nlsolve.contracts.status import SolveError
 from nlsolve.results.columns import DIAGNOSTICS
 from nlsolve.results.parameters import names_settings
 from nlsolve.solving.ledger import Ledger
+from nlsolve.solving.simulate import simulation_of
 from nlsolve.study.study import Study
 
 NO_CLOUD = "this scene has no cloud, and no operators on it"
@@ -31,8 +32,7 @@ def diagnose(study: Study) -> pd.DataFrame:
     for case in study.cases:
         named = {name: case.parameters[name] for name in case.swept if telling(name)}
         try:
-            simulation = case.parts.scene.simulation(case.parts, Ledger().entry)
-            found = simulation.diagnostics()
+            found = simulation_of(case.parts, Ledger().entry).diagnostics()
         except SolveError as error:
             refused = {**named, "operator": error.detail}
             rows += [refused] if refused not in rows else []

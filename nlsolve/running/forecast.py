@@ -11,6 +11,7 @@ from nlsolve.contracts.component import Component
 from nlsolve.registry.component_tables import class_name
 from nlsolve.running.timing import calibrate
 from nlsolve.solving.ledger import Ledger
+from nlsolve.solving.simulate import simulation_of
 from nlsolve.study.study import Study
 
 SOLVES = 20
@@ -51,7 +52,7 @@ def forecast(study: Study) -> pd.DataFrame:
         key = "".join(_identity(part) for name, part in case.parts if name not in METHOD)
         if key not in measured:
             measured[key] = costs_of(case.parts)
-        costs, work = measured[key], case.parts.scene.simulation(case.parts, Ledger().entry).workload()
+        costs, work = measured[key], simulation_of(case.parts, Ledger().entry).workload()
         seconds = {
             "seconds_start": STAGE * work.stages * costs["seconds_iteration"],
             "seconds": work.increments * costs["seconds_increment"],

@@ -25,6 +25,7 @@ from nlsolve.contracts.status import SolveError
 from nlsolve.results.costs.unit_costs import UnitCosts
 from nlsolve.series import Array
 from nlsolve.solving.ledger import Ledger
+from nlsolve.solving.simulate import simulation_of
 
 ROUNDS = 5
 """How often all kinds of work are timed in turn."""
@@ -62,7 +63,7 @@ class Calibration:
 def calibrate(parts: Any, rounds: int = ROUNDS) -> Calibration:
     """Measure the costs of a case on the problem and the state that its simulation gives as a sample."""
     ledger = Ledger()
-    simulation = parts.scene.simulation(parts, ledger.entry)
+    simulation = simulation_of(parts, ledger.entry)
     with threadpool_limits(limits=1):
         try:
             problem, state = simulation.sample()

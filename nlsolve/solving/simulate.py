@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 import traceback
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Generator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Protocol
 
@@ -87,7 +87,7 @@ def run_case(
     parts : has the component of each section as an attribute of that name.
     listen, clock, watch : see `simulate`.
     """
-    return simulate(lambda entry: parts.scene.simulation(parts, entry), parts, listen, clock, watch)
+    return simulate(lambda entry: simulation_of(parts, entry), parts, listen, clock, watch)
 
 
 @np.errstate(all="ignore")  # what is not finite becomes a status, a doubt or a NaN
@@ -107,6 +107,31 @@ def simulate(
     """
     nothing: Callable[[Any], None] = lambda told: None  # noqa: E731
     return _Run(build, method, listen or nothing, clock, watch or nothing).record()
+
+
+class _Refused(Simulation):
+    """A simulation that could not be built: the case ends with what its scene raised."""
+
+    def __init__(self, refusal: SolveError) -> None:
+        self._refusal = refusal
+
+    def solves(self) -> Generator[Solve, Outcome, Outcome]:
+        raise self._refusal
+        yield
+
+    def sample(self) -> tuple[NonlinearProblem, Array]:
+        raise self._refusal
+
+    def diagnostics(self) -> list[dict[str, Any]]:
+        raise self._refusal
+
+
+def simulation_of(parts: Any, entry: Entry) -> Simulation:
+    """The simulation of these components; where the scene raises SolveError, one that ends with it."""
+    try:
+        return parts.scene.simulation(parts, entry)
+    except SolveError as refusal:
+        return _Refused(refusal)
 
 
 class _Run:

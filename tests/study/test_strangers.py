@@ -26,6 +26,8 @@ from nlsolve.plugin import (
     Section,
     Series,
     SingleSolve,
+    SolveError,
+    Status,
     System,
 )
 from nlsolve.registry.problems import StudyError
@@ -236,3 +238,21 @@ def test_the_command_line_knows_it(shell: Any, tmp_path: Path) -> None:
     result = shell("run", path, "--quick", "--json", "--out", tmp_path / "out")
     assert result.exit_code == 0, result.stderr
     assert {row["unknowns"] for row in json.loads(result.stdout)["runs"]} == {5}
+
+
+class Broken(Rod):
+    """A rod whose mesh cannot be made."""
+
+    kind: Literal["broken"] = "broken"  # type: ignore[assignment]
+
+    def simulation(self, parts: Any, entry: Entry) -> SingleSolve:
+        raise SolveError(Status.BAD_CLOUD, "the rod has a hole")
+
+
+def test_a_simulation_that_cannot_be_built_is_a_row_a_plan_and_a_diagnosis_with_its_sentence() -> None:
+    study = Study.from_dict({"question": "Why not?", "scene": Broken(), "solver": {"kind": "newton"}})
+    row = nlsolve.run(study).runs.iloc[0]
+    assert row["status"] == "bad cloud"
+    assert row["message"].endswith("the rod has a hole")
+    assert forecast(study)["seconds"].isna().all()
+    assert diagnose(study)["operator"].tolist() == ["the rod has a hole"]
