@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.stats import binomtest, bootstrap
+import scipy  # loads scipy.stats, which takes long, when it is first asked for
 
 from nlsolve.series import Array
 
@@ -39,7 +39,7 @@ def band(costs: Array, limits: Array, interval: float, samples: int, seed: int) 
         return np.stack([(drawn <= limit).mean(axis=axis) for limit in limits])
 
     ends = [
-        bootstrap(
+        scipy.stats.bootstrap(
             (row,), share, n_resamples=samples, confidence_level=interval, method="percentile", rng=seed
         ).confidence_interval
         for row in costs
@@ -52,5 +52,5 @@ def wilson(solved: int, runs: int, interval: float) -> tuple[float, float]:
 
     The score interval (Wilson 1927). A bootstrap is certain of success after five of five; this is not.
     """
-    low, high = binomtest(solved, runs).proportion_ci(interval, method="wilson")
+    low, high = scipy.stats.binomtest(solved, runs).proportion_ci(interval, method="wilson")
     return float(low), float(high)
