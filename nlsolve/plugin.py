@@ -12,18 +12,22 @@ from nlsolve.contracts.linear_solver import Factors, LinearSolver
 from nlsolve.contracts.nonlinear_solver import KeptTangent, NonlinearSolver, Step
 from nlsolve.contracts.problem import Expansion, NonlinearProblem
 from nlsolve.contracts.rules.globalization import Globalization, Search
+from nlsolve.contracts.rules.homotopy_form import HomotopyForm, Recurrence
 from nlsolve.contracts.rules.predictor import Predictor
+from nlsolve.contracts.rules.range_rule import Range, RangeRule, SeriesBranch
 from nlsolve.contracts.rules.refresh import RefreshRule, TangentHistory
 from nlsolve.contracts.scene import Entry, Misfit, Preparation, Scene, Section, Simulation, SingleSolve, Solve, Workload
 from nlsolve.contracts.status import SolveError, Status
 from nlsolve.flow.scene import FlowScene
 from nlsolve.registry.hookspecs import hookimpl
-from nlsolve.registry.nested import Globalized
+from nlsolve.registry.nested import AnyForm, AnyRange, Globalized
 from nlsolve.series import NoSeries, Series, as_column
 from nlsolve.solving.anderson_mixing import Mixing
 from nlsolve.solving.cached_jacobian import cached_jacobian
 
 __all__ = [
+    "AnyForm",
+    "AnyRange",
     "Cloud",
     "Component",
     "ConstitutiveLaw",
@@ -35,6 +39,7 @@ __all__ = [
     "FlowScene",
     "Globalization",
     "Globalized",
+    "HomotopyForm",
     "KeptTangent",
     "LinearSolver",
     "Misfit",
@@ -49,12 +54,16 @@ __all__ = [
     "PowerForm",
     "Predictor",
     "Preparation",
+    "Range",
+    "RangeRule",
     "Recording",
+    "Recurrence",
     "RefreshRule",
     "Scene",
     "Search",
     "Section",
     "Series",
+    "SeriesBranch",
     "Simulation",
     "SingleSolve",
     "Solve",

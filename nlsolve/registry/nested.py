@@ -2,6 +2,7 @@
 
 A field of type `Globalized` takes any installed globalisation, a stranger's too. The kind is looked up when a value is
 validated, because plugins are still being imported when the field is declared. The default of such a field is a table.
+Where the components seldom have fields of their own, `range = "ratio"` is short for `range = { kind = "ratio" }`.
 """
 
 from __future__ import annotations
@@ -13,14 +14,20 @@ from pydantic import BeforeValidator, SerializeAsAny
 from nlsolve.contracts.component import Component
 from nlsolve.contracts.nonlinear_solver import NonlinearSolver
 from nlsolve.contracts.rules.globalization import Globalization
+from nlsolve.contracts.rules.homotopy_form import HomotopyForm
+from nlsolve.contracts.rules.range_rule import RangeRule
 from nlsolve.registry.registry import load_registry
 
 
-def installed(contract: type[Component]) -> BeforeValidator:
-    """A validator that turns a table with a kind into a component of this contract, and reports mistakes in place."""
+def installed(contract: type[Component], by_name: bool = False) -> BeforeValidator:
+    """A validator that turns a table with a kind into a component of this contract, and reports mistakes in place.
+
+    by_name : whether a string is taken as well, for the table with that kind alone.
+    """
 
     def component(value: Any) -> Component:
-        return load_registry().component(contract.noun, value)
+        table = {"kind": value} if by_name and isinstance(value, str) else value
+        return load_registry().component(contract.noun, table)
 
     return BeforeValidator(component)
 
@@ -30,3 +37,9 @@ Globalized = Annotated[SerializeAsAny[Globalization], installed(Globalization)]
 
 AnySolver = Annotated[SerializeAsAny[NonlinearSolver], installed(NonlinearSolver)]
 """The type of a field that holds a nonlinear solver."""
+
+AnyRange = Annotated[SerializeAsAny[RangeRule], installed(RangeRule, by_name=True)]
+"""The type of a field that holds a range rule, by its table or its name."""
+
+AnyForm = Annotated[SerializeAsAny[HomotopyForm], installed(HomotopyForm, by_name=True)]
+"""The type of a field that holds a homotopy form, by its table or its name."""

@@ -148,7 +148,7 @@ def _problem(detail: Mapping[str, Any], model: type[BaseModel], document: Any) -
         return Problem(place, ABSENT, "required, and missing")
     if kind == "kind_missing":
         return Problem((*place, "kind"), ABSENT, detail["msg"])
-    if kind == "kind_unknown":
+    if kind == "kind_unknown" and isinstance(value, Mapping):
         return Problem((*place, "kind"), value["kind"], detail["msg"])
     if kind == "union_tag_not_found":
         return Problem((*place, "kind"), ABSENT, "required, and missing")

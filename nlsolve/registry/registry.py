@@ -25,7 +25,9 @@ from nlsolve.contracts.continuum.law import ConstitutiveLaw
 from nlsolve.contracts.linear_solver import LinearSolver
 from nlsolve.contracts.nonlinear_solver import NonlinearSolver
 from nlsolve.contracts.rules.globalization import Globalization
+from nlsolve.contracts.rules.homotopy_form import HomotopyForm
 from nlsolve.contracts.rules.predictor import Predictor
+from nlsolve.contracts.rules.range_rule import RangeRule
 from nlsolve.contracts.rules.refresh import RefreshRule
 from nlsolve.contracts.scene import Scene
 from nlsolve.registry import hookspecs
@@ -42,6 +44,8 @@ CONTRACTS: dict[str, type[Component]] = {
         RefreshRule,
         Predictor,
         Globalization,
+        RangeRule,
+        HomotopyForm,
     )
 }
 """The contracts whose classes a plugin may offer, by noun, in the order of a study file."""

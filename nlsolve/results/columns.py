@@ -223,6 +223,12 @@ STEPS = _by_name(
     ),
     Column("range", "a_max of the last series computed for the step", symbol=r"$a_{\max}$"),
     Column(
+        "range_quantity",
+        "by what the range rule decided, at the end of the path: it is within the range where this is at most "
+        "range_threshold (for a rule of η: what must not exceed η)",
+    ),
+    Column("range_threshold", "what range_quantity must not exceed for the range to reach the end of the path"),
+    Column(
         "singularity",
         "distance of the nearest singularity of the last series, as a part of its path, from its last terms",
     ),
@@ -302,6 +308,8 @@ RENAMED: Mapping[str, str] = MappingProxyType(
         "branch": "tangents",
         "said_converged_but_is_not": "false_convergence",
         "said_failed_but_is": "false_failure",
+        "solver.range": "solver.range.kind",
+        "solver.form": "solver.form.kind",
     }
 )
 """What columns of `runs` and `steps` were once called -> what they are called now."""

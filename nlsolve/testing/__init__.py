@@ -15,17 +15,25 @@ from nlsolve.testing.discretizers import check_discretizer
 from nlsolve.testing.laws import check_law
 from nlsolve.testing.linear_solvers import check_linear_solver
 from nlsolve.testing.problems import check_problem
-from nlsolve.testing.rules import check_globalization, check_predictor, check_refresh_rule
+from nlsolve.testing.rules import (
+    check_globalization,
+    check_homotopy_form,
+    check_predictor,
+    check_range_rule,
+    check_refresh_rule,
+)
 from nlsolve.testing.scenes import check_scene, check_system
 from nlsolve.testing.solvers import check_solver
 
 __all__ = [
     "check_discretizer",
     "check_globalization",
+    "check_homotopy_form",
     "check_law",
     "check_linear_solver",
     "check_predictor",
     "check_problem",
+    "check_range_rule",
     "check_refresh_rule",
     "check_scene",
     "check_solver",

@@ -1,12 +1,17 @@
-"""The checks of globalizations, predictors and refresh rules."""
+"""The checks of globalizations, predictors, refresh rules, range rules and homotopy forms."""
 
 from __future__ import annotations
+
+from collections.abc import Callable
 
 import numpy as np
 
 from nlsolve.contracts.rules.globalization import Globalization
+from nlsolve.contracts.rules.homotopy_form import HomotopyForm
 from nlsolve.contracts.rules.predictor import Predictor
+from nlsolve.contracts.rules.range_rule import RangeRule
 from nlsolve.contracts.rules.refresh import RefreshRule, TangentHistory
+from nlsolve.series import Array
 from nlsolve.testing.promises import norm, require, same
 from nlsolve.testing.toy_problem import ToyProblem
 
@@ -64,3 +69,107 @@ def check_refresh_rule(rule: RefreshRule) -> None:
             first, again = rule.due(history), rule.due(history)
             require(isinstance(first, (bool, np.bool_)), f"due({history}) is {first!r}, not True or False")
             require(first == again, f"due({history}) changed its mind: a rule may look at the history only")
+
+
+class KnownBranch:
+    """The `SeriesBranch` of G(W) = (1 − q) ∘ W − w with K* = 1, of which all is known in closed form:
+
+        W_j = r_j = q^(j−1) ∘ w,    W(a) leaves −a^(p+1) q^p ∘ w in (1 − a) K* W + a G(W)
+
+    q : (U,), by how much an order is smaller than the one before, in each unknown.
+    """
+
+    def __init__(self, q: Array, order: int) -> None:
+        self._q, self._w, self.order = q, np.cos(np.arange(1.0, len(q) + 1.0)), order
+        self.terms = [q**j * self._w for j in range(order)]
+        self.sizes = [norm(term) for term in self.terms]
+        self.columns = np.asarray(np.linalg.qr(np.stack(self.terms, axis=1), mode="r"))
+        self.residual = self.sizes[0]
+
+    @property
+    def contraction(self) -> float:
+        """(‖r_p‖/‖r_1‖)^(1/(p−1))."""
+        return float((self.sizes[-1] / self.sizes[0]) ** (1.0 / (self.order - 1)))
+
+    @property
+    def singularity(self) -> float:
+        """(‖W_{p−2}‖/‖W_p‖)^(1/2)."""
+        return float((self.sizes[-3] / self.sizes[-1]) ** 0.5)
+
+    def approximant(self, order: int | None = None) -> Callable[[float], Array]:
+        """The series of the first `order` terms."""
+        p = order or self.order
+        return lambda a: self.columns[:, :p] @ a ** np.arange(1.0, p + 1.0)
+
+    def next_coefficient(self) -> Array:
+        """q^p ∘ w."""
+        return self._q**self.order * self._w
+
+    def defect(self, a: float) -> float:
+        """a^(p+1) ‖q^p ∘ w‖."""
+        return float(a ** (self.order + 1)) * norm(self.next_coefficient())
+
+    def numbers(self) -> list[Array]:
+        """Copies of all arrays that a rule can reach."""
+        return [np.array(values) for values in (*self.terms, self.columns, self.sizes)]
+
+
+def check_range_rule(rule: RangeRule) -> None:
+    """Check the ranges of branches that are known in closed form: fast and slow, converging and not, of orders 3 to 15.
+
+    a_max is positive or infinite, and the same each time; it grows with η, or is infinite; whether it reaches the end
+    of the path does not depend on `used`; the branch is not changed. Raises AssertionError.
+    """
+    line = np.linspace(-1.0, 1.0, 16) + 0.01
+    for q in (0.05 * line, 0.6 * line, 1.5 * line):
+        for order in (3, 8, 15):
+            branch = KnownBranch(q, order)
+            before = branch.numbers()
+            case = f"of order {order} with terms that fall by {np.abs(q).max():.2g} each"
+            ranges = []
+            for tolerance in (1e-12, 1e-6, 1e-2):
+                found, again = rule.limit(branch, tolerance, True), rule.limit(branch, tolerance, True)
+                what = f"a_max = {found.a_max} for a branch {case} and η = {tolerance:g}"
+                require(found.a_max > 0.0, f"{what}: a range is positive or infinite")
+                require(found.a_max == again.a_max, f"{what} was {again.a_max} when it was asked again")
+                growing = rule.limit(branch, tolerance, False).a_max
+                require((growing >= 1.0) == (found.a_max >= 1.0), f"{what}, but {growing} where it will not be used")
+                ranges.append(found.a_max)
+            require(ranges == sorted(ranges), f"a_max of a branch {case} falls where η grows: {ranges}")
+            require(ranges[0] < ranges[-1] or np.isinf(ranges[0]), f"a_max of a branch {case} does not grow with η")
+            require(all(map(np.array_equal, before, branch.numbers())), f"the rule changed a branch {case}")
+
+
+def check_homotopy_form(form: HomotopyForm) -> None:
+    """Check the recurrence of a form on a toy problem, with K* the tangent at the state and the tangent elsewhere.
+
+    r_1 = −G(0); a right-hand side is the same when it is asked for again; with W_1 … W_p the homotopy is met up to
+    O(a^(p+1)); the state is not changed. Raises AssertionError.
+    """
+    problem, order = ToyProblem(), 4
+    state = ToyProblem.solution + 0.5 * np.cos(np.arange(12.0))
+    kept = state.copy()
+    for shift in (0.0, 0.2):
+        matrix = problem.jacobian(state + shift).toarray()
+        recurrence = form.recurrence(problem, state)
+        first = problem.residual(state)
+        same(recurrence.right_hand_side(), -first, norm(first), "r_1, which is −G(0)")
+        terms, rhs = list[Array](), list[Array]()
+        for _ in range(order):
+            rhs.append(recurrence.right_hand_side().copy())
+            again = recurrence.right_hand_side()
+            require(np.array_equal(again, rhs[-1]), f"r_{len(rhs)} is another when it is asked for again")
+            terms.append(np.linalg.solve(matrix, rhs[-1]))
+            recurrence.append(terms[-1])
+
+        def missed(a: float) -> float:
+            weights = a ** np.arange(1.0, order + 1.0)
+            g = problem.residual(state + weights @ np.array(terms))
+            return norm(recurrence.miss(a, g, weights, rhs))
+
+        found = float(np.log2(missed(0.1) / missed(0.05)))
+        require(
+            abs(found - order - 1) <= 0.3,
+            f"W_1 … W_{order} leave O(a^{found:.2f}) in the homotopy, not O(a^{order + 1})",
+        )
+    require(np.array_equal(state, kept), "the form changed the state it was given")

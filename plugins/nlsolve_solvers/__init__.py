@@ -8,7 +8,7 @@ from nlsolve.plugin import Component, hookimpl
 from nlsolve_solvers.anderson import Anderson
 from nlsolve_solvers.broyden import Broyden
 from nlsolve_solvers.external import Kinsol, PetscSnes, ScipyRoot
-from nlsolve_solvers.homotopy import AsymptoticNumericalMethod
+from nlsolve_solvers.homotopy import FORMS, RANGE_RULES, AsymptoticNumericalMethod
 from nlsolve_solvers.krylov import NewtonKrylov
 from nlsolve_solvers.levenberg_marquardt import LevenbergMarquardt
 from nlsolve_solvers.modified_newton import ModifiedNewton
@@ -38,5 +38,5 @@ METHODS = (
 
 @hookimpl
 def nlsolve_components() -> Iterable[type[Component]]:
-    """The methods of this package."""
-    return METHODS
+    """The methods of this package, and the range rules and homotopy forms of one of them."""
+    return (*METHODS, *RANGE_RULES, *FORMS)

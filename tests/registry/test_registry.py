@@ -104,6 +104,8 @@ def test_classes_by_noun_and_kind():
         "refresh",
         "predictor",
         "globalization",
+        "range",
+        "form",
     }
 
 

@@ -10,14 +10,16 @@ one K* serves all orders however old it is. With J the tangent of G at W = 0, wh
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from typing import Literal
 
 import numpy as np
 
-from nlsolve.plugin import NonlinearProblem
+from nlsolve.plugin import HomotopyForm, NonlinearProblem, Recurrence
 
 
-class Recurrence(ABC):
-    """The r_j of one form around one state; r_{j+1} may be asked for once W_1 … W_j have been appended."""
+class Expanded(ABC):
+    """The `Recurrence` of a form whose r_{j+1} differ from r_j by what the Taylor series of G tells."""
 
     def __init__(self, problem: NonlinearProblem, state: np.ndarray) -> None:
         self._expansion = problem.expand(state)
@@ -43,11 +45,11 @@ class Recurrence(ABC):
         """r_j − r_{j+1}."""
 
     @abstractmethod
-    def miss(self, a: float, g: np.ndarray, weights: np.ndarray, rhs: list[np.ndarray]) -> np.ndarray:
+    def miss(self, a: float, g: np.ndarray, weights: np.ndarray, rhs: Sequence[np.ndarray]) -> np.ndarray:
         """What g = G(W) leaves in the homotopy at a, where W = Σ_j w_j W_j and so K* W = Σ_j w_j r_j; g at a = 1."""
 
 
-def weighted(weights: np.ndarray, vectors: list[np.ndarray]) -> np.ndarray:
+def weighted(weights: np.ndarray, vectors: Sequence[np.ndarray]) -> np.ndarray:
     """Σ_j w_j x_j, over the weights there are."""
     total = np.zeros_like(vectors[0])
     for weight, vector in zip(weights, vectors, strict=False):
@@ -55,18 +57,18 @@ def weighted(weights: np.ndarray, vectors: list[np.ndarray]) -> np.ndarray:
     return total
 
 
-class FixedPoint(Recurrence):
+class FixedPointRecurrence(Expanded):
     """r_1 = −G(0),  r_{j+1} = r_j − [G]_j, with [.]_j the Taylor coefficient in a."""
 
     def _change(self, j: int) -> np.ndarray:
         return self._expansion.coefficient(j)
 
-    def miss(self, a: float, g: np.ndarray, weights: np.ndarray, rhs: list[np.ndarray]) -> np.ndarray:
+    def miss(self, a: float, g: np.ndarray, weights: np.ndarray, rhs: Sequence[np.ndarray]) -> np.ndarray:
         """(1 − a) K* W + a G(W)."""
         return (1.0 - a) * weighted(weights, rhs) + a * g
 
 
-class NewtonForm(Recurrence):
+class NewtonRecurrence(Expanded):
     """r_1 = −G(0),  r_{j+1} = r_j − J W_j − Q_{j+1}, where [G]_j = J W_j + Q_j and Q_j needs W_1 … W_{j−1} only.
 
     By order j of the form K* W_j = −Q_j − (J − K*) W_{j−1}; for K* = J that is J W_j = −Q_j. What the fixed-point form
@@ -84,10 +86,30 @@ class NewtonForm(Recurrence):
         q_next = self._q_j = self._expansion.remainder(j + 1)
         return self._pulls[-1] + q_next
 
-    def miss(self, a: float, g: np.ndarray, weights: np.ndarray, rhs: list[np.ndarray]) -> np.ndarray:
+    def miss(self, a: float, g: np.ndarray, weights: np.ndarray, rhs: Sequence[np.ndarray]) -> np.ndarray:
         """G(W) − (1 − a) (G(0) + (J − K*) W)."""
         self.right_hand_side()  # brings J W_p
         return g - (1.0 - a) * (weighted(weights, self._pulls) - weighted(weights, rhs) - self._start)
 
 
-FORMS: dict[str, type[Recurrence]] = {"fixed-point": FixedPoint, "newton": NewtonForm}
+class FixedPoint(HomotopyForm):
+    """(1 − a) K* W + a G(W) = 0 (Timesli et al. 2015)."""
+
+    kind: Literal["fixed-point"] = "fixed-point"
+
+    def recurrence(self, problem: NonlinearProblem, state: np.ndarray) -> Recurrence:
+        """One order of the residual for each r_j."""
+        return FixedPointRecurrence(problem, state)
+
+
+class NewtonForm(HomotopyForm):
+    """G(W) = (1 − a) (G(0) + (J − K*) W), with K* = J the Newton homotopy G(W) = (1 − a) G(0)."""
+
+    kind: Literal["newton"] = "newton"
+
+    def recurrence(self, problem: NonlinearProblem, state: np.ndarray) -> Recurrence:
+        """Two orders of the residual for each r_j."""
+        return NewtonRecurrence(problem, state)
+
+
+FORMS: tuple[type[HomotopyForm], ...] = (FixedPoint, NewtonForm)

@@ -11,12 +11,21 @@ from typing import ClassVar, Literal
 import numpy as np
 from pydantic import Field
 
-from nlsolve.plugin import KeptTangent, NonlinearProblem, NonlinearSolver, SolveError, Status, Step
-from nlsolve_solvers.homotopy.branch import Branch
-from nlsolve_solvers.homotopy.ranges import RULES
+from nlsolve.plugin import (
+    AnyForm,
+    AnyRange,
+    KeptTangent,
+    NonlinearProblem,
+    NonlinearSolver,
+    Range,
+    SolveError,
+    Status,
+    Step,
+)
+from nlsolve_solvers.homotopy.branch import Branch, BranchView
 
 ROUNDING = 1e-10  # W_2 below this part of W_1 is rounding: K* is the tangent
-SHORTEST_RANGE = 1e-6  # a series that advances less than this part of its path is exhausted
+SHORTEST_RANGE = 1e-6  # a series that advances no more than this part of its path is exhausted
 LOOSEST = 0.1  # η where little residual is left: a series must still gain a digit
 END = "end of path"
 FIRST_CHECK = 3  # terms before an adaptive series asks for its range: W_2 may vanish
@@ -28,10 +37,20 @@ class AsymptoticNumericalMethod(NonlinearSolver):
     Choices, each independent of the others: the form of the homotopy (and so of r_j), how W(a) is made of the W_j, the
     rule for its range a_max, whether p is a number or found as the series goes, whether η is a number or what a wanted
     residual asks for, and Newton corrections at the end of the path.
-    a_max ≥ 1: W(1) is the solution and K* is kept. a_max < 1: the refresh rule may renew K* here and the series is
-    computed again; with a K* that is already new, the state advances to W(a_max) and a branch begins there. Each branch
-    that is used says what limited its range (`limited_by` in `steps`).
-    The defaults are the method of the 2015 paper, but its range looks at two terms instead of one (`ratio`).
+    a_max ≥ 1: W(1) is the solution and K* is kept. a_max < 1 is a choice, `short_range`:
+
+        renew     the refresh rule may renew K* here, and the series is computed again; where K* is new already, or is
+                  kept, the state advances to W(a_max) and a branch begins there
+        advance   the state advances to W(a_max) with the K* there is, and a branch begins there, where the refresh rule
+                  may renew K*
+        accept    the state is W(1) and claimed to be the solution all the same; the refresh rule may renew K* at the
+                  next increment, or where the next branch begins if the stopping test does not take the claim
+
+    The wording of the 2015 paper allows `advance` and `accept`. A series without any range is never used: the refresh
+    rule may renew K* at once, whatever the choice. Each branch that is used says what limited its range (`limited_by`
+    in `steps`), and by which quantity and threshold its range rule decided (`range_quantity`, `range_threshold`).
+    The defaults are the method of the 2015 paper, but its range looks at two terms (`ratio`) instead of one
+    (`last-term`), and a range below 1 renews K* at once.
 
     An adaptive series stops at the first order with a_max ≥ 1, or where one more order costs more, by the range it
     adds, than a new branch does: in units of one order a branch of p orders costs c + p and advances a_max, so where
@@ -46,17 +65,21 @@ class AsymptoticNumericalMethod(NonlinearSolver):
     tolerance: float = Field(
         1e-6,
         gt=0,
-        description="η: largest last term over the first (ratio), residual left over the first (residual rules), "
+        description="η: last term over the first (ratio, last-term), residual left over the first (residual rules), "
         "difference over the value (pade-pair), (1/ρ)^p with ρ the nearest pole",
     )
-    form: Literal["fixed-point", "newton"] = Field(
-        "fixed-point", description="(1 − a) K* W + a G(W) = 0, or G(W) = (1 − a) (G(0) + (J − K*) W)"
+    form: AnyForm = Field(  # type: ignore[assignment]
+        {"kind": "fixed-point"},
+        description="(1 − a) K* W + a G(W) = 0 (fixed-point), or G(W) = (1 − a) (G(0) + (J − K*) W) (newton)",
     )
     extrapolation: Literal["series", "pade", "gram-schmidt-pade"] = Field(
         "series", description="how W(a) is made of its Taylor coefficients"
     )
-    range: Literal["ratio", "residual-coefficient", "true-residual", "pade-pair", "nearest-pole"] = Field(
-        "ratio", description="what limits a_max"
+    range: AnyRange = Field(  # type: ignore[assignment]
+        {"kind": "ratio"}, description="what limits a_max: a range rule"
+    )
+    short_range: Literal["renew", "advance", "accept"] = Field(
+        "renew", description="a_max < 1: renew K* and compute the series again, go on from W(a_max), or accept W(1)"
     )
     adaptive: bool = Field(
         False, description="stop adding orders, from the third on, as soon as a_max ≥ 1 or a new branch is cheaper"
@@ -78,17 +101,17 @@ class AsymptoticNumericalMethod(NonlinearSolver):
         yield Step(state)
         while True:
             fresh = tangent.refresh_if_due(lambda: problem.jacobian(state))
-            branch, reach, limit = self._branch(problem, tangent, state, goal)
-            if reach < 1.0 and not fresh and tangent.refresh_if_due(lambda: problem.jacobian(state)):
-                branch, reach, limit = self._branch(problem, tangent, state, goal)
-            length = min(1.0, reach)
-            if not length > SHORTEST_RANGE:
-                nearest = f"its nearest singularity is about {branch.singularity:.1e} of the path away"
-                raise SolveError(
-                    Status.RANGE_EXHAUSTED, f"a_max = {reach:.1e} for a series of order {branch.order}; {nearest}"
-                )
+            branch, found, limit = self._branch(problem, tangent, state, goal)
+            is_short = not (found.a_max >= 1.0 if self.short_range == "renew" else found.a_max > SHORTEST_RANGE)
+            if is_short and not fresh and tangent.refresh_if_due(lambda: problem.jacobian(state)):
+                branch, found, limit = self._branch(problem, tangent, state, goal)
+            if not found.a_max > SHORTEST_RANGE:
+                raise self._exhausted(branch, found)
+            length = 1.0 if self.short_range == "accept" else min(1.0, found.a_max)
             notes: dict[str, float | str] = {
-                "range": reach,
+                "range": found.a_max,
+                "range_quantity": found.quantity,
+                "range_threshold": found.threshold,
                 "length": length,
                 "limited_by": limit,
                 "singularity": branch.singularity,
@@ -102,41 +125,54 @@ class AsymptoticNumericalMethod(NonlinearSolver):
 
     def _branch(
         self, problem: NonlinearProblem, tangent: KeptTangent, state: np.ndarray, goal: float | None
-    ) -> tuple[Branch, float, str]:
+    ) -> tuple[Branch, Range, str]:
         """W_1 … W_p around `state`, a_max, and what limited it. The refresh rule is told a_max, and the contraction per
         order, which is what K* decides.
         """
-        branch, rule = Branch(problem, state, self.form, self.extrapolation), RULES[self.range]
-        reaches: list[float] = []
-        limit: str = self.range
+        branch = Branch(problem, state, self.form, self.extrapolation)
+        view, ranges = BranchView(branch), list[Range]()
+        limit = self.range.kind_name()
         for j in range(1, self.order + 1):
             rhs = branch.recurrence.right_hand_side()
             branch.append(rhs, tangent.solve(rhs))
             if branch.sizes[0] == 0.0:
-                reaches.append(np.inf)
+                ranges.append(Range(np.inf))
                 break
             if self.adaptive and FIRST_CHECK <= j < self.order:
-                reaches.append(rule(branch, self._tolerance(branch, goal), False))
-                if reaches[-1] >= 1.0:
+                ranges.append(self.range.limit(view, self._tolerance(branch, goal), False))
+                if ranges[-1].a_max >= 1.0:
                     break
-                if self._is_dear(reaches, j):
+                if self._is_dear([one.a_max for one in ranges], j):
                     limit = "cost"
                     break
-        if not (reaches and reaches[-1] >= 1.0):
+        if not (ranges and ranges[-1].a_max >= 1.0):
             if self.order == 2 and branch.sizes[1] <= ROUNDING * branch.sizes[0]:
                 raise SolveError(
                     Status.RANGE_EXHAUSTED,
                     "W_2 vanishes because K* is the tangent here, so a series of order 2 has no range: "
                     "use order 3 or more",
                 )
-            reaches.append(rule(branch, self._tolerance(branch, goal), True))
-        reach = 0.0 if np.isnan(reaches[-1]) else reaches[-1]
-        tangent.observe(range=reach, contraction=branch.contraction)
-        if reach >= 1.0:
-            return branch, reach, END
+            ranges.append(self.range.limit(view, self._tolerance(branch, goal), True))
+        found = ranges[-1]
+        tangent.observe(range=found.a_max if found.a_max >= 0.0 else 0.0, contraction=branch.contraction)
+        if found.a_max >= 1.0:
+            return branch, found, END
         if self.adaptive and branch.order == self.order:
             limit = "order"
-        return branch, reach, "pole" if branch.has_pole() else limit
+        return branch, found, "pole" if branch.has_pole() else limit
+
+    def _exhausted(self, branch: Branch, found: Range) -> SolveError:
+        """The error of a series that has no range, or of a rule whose answer is no range."""
+        if found.a_max >= 0.0:
+            nearest = f"its nearest singularity is about {branch.singularity:.1e} of the path away"
+            sentence = f"a_max = {found.a_max:.1e} for a series of order {branch.order}; {nearest}"
+        else:
+            sentence = (
+                f"the range rule {self.range.kind_name()!r} gave a_max = {found.a_max:.1e} for a series of order "
+                f"{branch.order}, where a range is positive or infinite: correct the rule "
+                "(nlsolve.testing.check_range_rule), choose another, or lower the order if its terms overflow"
+            )
+        return SolveError(Status.RANGE_EXHAUSTED, sentence)
 
     def _tolerance(self, branch: Branch, goal: float | None) -> float:
         """η: as given, or the part of ‖G(0)‖ that a wanted residual leaves."""

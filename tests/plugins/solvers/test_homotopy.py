@@ -11,11 +11,10 @@ import pytest
 import scipy.sparse as sp
 from cases import near, run, spin_flow
 from nlsolve_rules.refresh import EveryIteration, Never, RangeUnderOne
-from nlsolve_solvers.homotopy import AsymptoticNumericalMethod
-from nlsolve_solvers.homotopy.branch import Branch
+from nlsolve_solvers.homotopy import FORMS as FORM_CLASSES
+from nlsolve_solvers.homotopy import RANGE_RULES, AsymptoticNumericalMethod
+from nlsolve_solvers.homotopy.branch import Branch, BranchView
 from nlsolve_solvers.homotopy.extrapolations import PADES, coordinates, extrapolate, series
-from nlsolve_solvers.homotopy.forms import FORMS
-from nlsolve_solvers.homotopy.ranges import RULES
 from pydantic import ValidationError
 
 import nlsolve
@@ -29,6 +28,8 @@ from nlsolve.testing.toy_problem import DenseLU, ToyProblem
 Method = AsymptoticNumericalMethod
 FIXED, NEWTON = "fixed-point", "newton"
 KINDS = ("series", *PADES)
+FORMS = {cls.kind_name(): cls() for cls in FORM_CLASSES}
+RULES = {cls.kind_name(): cls() for cls in RANGE_RULES}
 VARIANTS = list(product(FORMS, KINDS, RULES, (False, True)))
 SMALL = ToyProblem()
 START = SMALL.solution + 0.5 * np.cos(np.arange(12.0))
@@ -38,11 +39,16 @@ STUDIES = Path(__file__).parents[3] / "studies"
 def branch(problem: NonlinearProblem, start: Array, matrix: Any, order: int, form: str, kind: str = "series") -> Branch:
     """W_1 … W_p with a K* of one's own."""
     inverse = np.linalg.inv(matrix.toarray())
-    made = Branch(problem, start, form, kind)
+    made = Branch(problem, start, FORMS[form], kind)
     for _ in range(order):
         rhs = made.recurrence.right_hand_side()
         made.append(rhs, inverse @ rhs)
     return made
+
+
+def a_max(rule: str, made: Branch, tolerance: float, used: bool = True) -> float:
+    """What a range rule says of a branch."""
+    return RULES[rule].limit(BranchView(made), tolerance, used).a_max
 
 
 # The nearest singularity.
@@ -239,11 +245,11 @@ def test_no_terms_make_the_series() -> None:
 @pytest.mark.parametrize("form", FORMS)
 def test_the_true_residual_is_kept_to_the_end_of_its_range(form: str, kind: str) -> None:
     made = branch(SMALL, START - 1.5, SMALL.jacobian(START - 1.0), 5, form, kind)
-    a = RULES["true-residual"](made, 1e-5, True)
+    a = a_max("true-residual", made, 1e-5)
     assert 0.0 < a < 1.0
     assert made.defect(a) <= 1e-5 * made.residual
     assert made.defect(1.0) > 1e-5 * made.residual
-    assert RULES["true-residual"](made, 1e9, True) > 1.0
+    assert a_max("true-residual", made, 1e9) > 1.0
 
 
 def test_a_residual_that_is_not_finite_shortens_the_range() -> None:
@@ -251,33 +257,33 @@ def test_a_residual_that_is_not_finite_shortens_the_range() -> None:
     made.terms = [1e4 * term for term in made.terms]
     with np.errstate(all="ignore"):
         assert not np.isfinite(made.defect(1.0))
-        assert 0.0 < RULES["true-residual"](made, 1e-6, True) < 0.1
+        assert 0.0 < a_max("true-residual", made, 1e-6) < 0.1
 
 
 @pytest.mark.parametrize("form", FORMS)
 def test_the_coefficient_left_over_is_the_residual_of_a_linear_problem(form: str) -> None:
     flow = spin_flow(1.0)
     made = branch(flow, near(flow, 0.5), 1.3 * flow.jacobian(near(flow, 0.5)), 5, form)
-    left = RULES["residual-coefficient"](made, 1.0, True) ** -6 * made.residual
+    left = a_max("residual-coefficient", made, 1.0) ** -6 * made.residual
     assert left == pytest.approx(made.defect(1.0), rel=1e-6)
 
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_approximants_of_two_orders_differ_by_the_tolerance_where_the_range_ends(kind: str) -> None:
     made = branch(SMALL, START - 1.5, SMALL.jacobian(START - 1.0), 6, FIXED, kind)
-    a = RULES["pade-pair"](made, 1e-4, True)
+    a = a_max("pade-pair", made, 1e-4)
     assert 0.0 < a < 1.0
     now, before = made.extrapolation().weights(a), made.extrapolation(5).weights(a)
     terms = np.stack(made.terms, axis=1)
     gap = np.linalg.norm(terms @ now - terms[:, :5] @ before)
     assert gap == pytest.approx(1e-4 * np.linalg.norm(terms @ now), rel=1e-5)
-    assert RULES["pade-pair"](made, 1e9, True) > 1.0
+    assert a_max("pade-pair", made, 1e9) > 1.0
 
 
 def test_the_nearest_pole_bounds_the_range() -> None:
-    made = Branch(SMALL, START, FIXED, "series")
+    made = Branch(SMALL, START, FORMS[FIXED], "series")
     made.terms = rational([0.4 + 0.6j, 0.4 - 0.6j, 1.5], 8)
-    assert RULES["nearest-pole"](made, 1e-4, True) == pytest.approx(1e-4 ** (1 / 8) * abs(0.4 + 0.6j), rel=1e-6)
+    assert a_max("nearest-pole", made, 1e-4) == pytest.approx(1e-4 ** (1 / 8) * abs(0.4 + 0.6j), rel=1e-6)
 
 
 # The method.
@@ -373,7 +379,7 @@ def test_an_adaptive_branch_names_the_highest_order_or_the_cost() -> None:
 
 
 def test_a_branch_whose_padé_has_a_pole_on_its_path_says_so() -> None:
-    made = Branch(SMALL, START, FIXED, "pade")
+    made = Branch(SMALL, START, FORMS[FIXED], "pade")
     for one in rational([0.5], 6):
         made.terms.append(one)
     assert made.has_pole()
