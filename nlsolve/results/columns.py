@@ -308,8 +308,6 @@ RENAMED: Mapping[str, str] = MappingProxyType(
         "branch": "tangents",
         "said_converged_but_is_not": "false_convergence",
         "said_failed_but_is": "false_failure",
-        "solver.range": "solver.range.kind",
-        "solver.form": "solver.form.kind",
     }
 )
 """What columns of `runs` and `steps` were once called -> what they are called now."""
@@ -317,7 +315,10 @@ RENAMED: Mapping[str, str] = MappingProxyType(
 
 def no_such_column(name: str, known: Iterable[str]) -> str:
     """The sentence for a name that is no column: what the column is called now, or the nearest of the names `known`."""
+    known = list(known)
     present = RENAMED.get(name) or moved_name(name)
     if present is not None:
         return f"this column is called {present} now"
+    if f"{name}.kind" in known:  # a parameter that is a component, perhaps one that was a word in older studies
+        return f"this is a component, whose name is in the column {name}.kind"
     return f"no such column of the results; {did_you_mean(name, known)}"

@@ -60,6 +60,11 @@ def test_an_old_name_is_answered_with_the_new_one(old: str) -> None:
     assert no_such_column(old, RUNS) == f"this column is called {RENAMED[old]} now"
 
 
+def test_a_component_is_answered_with_the_column_of_its_kind() -> None:
+    told = no_such_column("solver.range", ["solver.range.part", "solver.range.kind"])
+    assert told == "this is a component, whose name is in the column solver.range.kind"
+
+
 def test_an_unknown_name_is_answered_with_the_nearest() -> None:
     assert no_such_column("secnds", RUNS) == "no such column of the results; did you mean 'seconds'?"
 

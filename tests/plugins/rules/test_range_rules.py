@@ -225,9 +225,9 @@ def test_what_is_wrong_is_told_in_its_own_place(fields: dict[str, Any], sentence
     assert sentence in str(caught.value)
 
 
-def test_a_table_by_the_old_column_is_told_its_name() -> None:
+def test_a_table_by_the_old_column_is_told_the_new_one() -> None:
     table = [{"name": "t", "rows": "solver.range", "value": "tangents"}]
-    with pytest.raises(StudyError, match=r"this column is called solver\.range\.kind now"):
+    with pytest.raises(StudyError, match=r"whose name is in the column solver\.range\.kind"):
         Study.from_dict(CASE | {"solver": {"kind": "anm"}, "table": table})
 
 
