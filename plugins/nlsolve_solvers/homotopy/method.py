@@ -182,7 +182,7 @@ class AsymptoticNumericalMethod(NonlinearSolver):
 
     def _is_dear(self, reaches: list[float], p: int) -> bool:
         """Whether the order p added less range than a new branch of p orders would, at the price of an order."""
-        if len(reaches) < 3:
+        if len(reaches) < 3 or not reaches[-3] > 0.0:
             return False
         growth = np.sqrt(reaches[-1] / reaches[-3])
         return bool(growth < 1.0 + 1.0 / (self.branch_cost + p))

@@ -262,6 +262,14 @@ def test_a_rule_that_gives_no_range_ends_with_its_name_and_the_way_out(value: st
     assert "\n" not in outcome.detail
 
 
+@pytest.mark.parametrize("adaptive", [False, True])
+def test_a_rule_that_gives_nothing_ends_as_a_series_without_range(adaptive: bool) -> None:
+    solver = Method(order=8, range=Constant(value=0.0), adaptive=adaptive)
+    outcome, _ = run(ToyProblem(), solver, RangeUnderOne(), START, DenseLU())
+    assert outcome.status is Status.RANGE_EXHAUSTED
+    assert outcome.detail.startswith("a_max = 0.0e+00 for a series of order 8")
+
+
 class Shrinking(Constant):
     kind: Literal["shrinking"] = "shrinking"  # type: ignore[assignment]
 
