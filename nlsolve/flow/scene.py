@@ -11,7 +11,7 @@ from pydantic import ValidationError
 
 from nlsolve.contracts.continuum.discretizer import Discretizer
 from nlsolve.contracts.continuum.geometry import Geometry
-from nlsolve.contracts.continuum.law import ConstitutiveLaw, tangent_moduli
+from nlsolve.contracts.continuum.law import ConstitutiveLaw
 from nlsolve.contracts.continuum.terms import NodeMotion, Physics, Recording, TimeSteps
 from nlsolve.contracts.rules.predictor import Predictor
 from nlsolve.contracts.scene import Entry, Misfit, Scene, Section
@@ -67,11 +67,11 @@ class FlowScene(Geometry, Scene, ABC):
         if not parts.time.increments:
             raise Misfit("start", "at", "a steady scene has no increment to begin: set time.horizon, or values = []")
         with np.errstate(all="ignore"):
-            moduli = tangent_moduli(parts.law, np.zeros((3, 1)))
-        if not np.isfinite(moduli).all():
+            viscosity = parts.law.viscosity(np.zeros(1))
+        if not np.isfinite(viscosity).all():
             raise Misfit(
                 "start",
                 "at",
-                "the law has no finite viscosity and tangent at ε̄ = 0, where the march would begin: "
-                'set law.regularization > 0, or at = "state"',
+                "the law has no finite viscosity at ε̄ = 0, where the march would begin: "
+                'choose law.regularization > 0, or at = "state"',
             )

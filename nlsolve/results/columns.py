@@ -124,8 +124,8 @@ RUNS = _by_name(
     ),
     Column(
         "residual_absolute",
-        "largest ‖R‖₂ accepted in any increment, in the unit of the problem: of a flow N/mm³, or N/mm in a conservative "
-        "form",
+        "largest ‖R‖₂ accepted in any increment, in the unit of the problem: N/mm³ for a flow, N/mm in a conservative "
+        "form of it",
         symbol=r"$\|R\|_2$",
     ),
     Column("divergence", "‖div V‖/‖ε̄‖ over volume points and strain points at the end, with a volumetric term"),
@@ -224,7 +224,7 @@ STEPS = _by_name(
     Column("residual_norm", "relative residual at the step", symbol="relative residual"),
     Column(
         "residual_absolute",
-        "‖R‖₂ at the step, in the unit of the problem: of a flow N/mm³, or N/mm in a conservative form",
+        "‖R‖₂ at the step, in the unit of the problem: N/mm³ for a flow, N/mm in a conservative form of it",
         symbol=r"$\|R\|_2$",
     ),
     Column(
