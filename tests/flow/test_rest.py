@@ -174,6 +174,7 @@ def test_a_first_increment_that_fails_leaves_nothing_measured() -> None:
     assert (row["increments"], row["time"], row["iterations"]) == (0, 0.0, 1)
     assert pd.isna(row["validity_time"])
     assert "velocity_error" not in row
+    assert row["residual_absolute"] > row["residual_norm"] > 1e-9
     assert "the residual is largest at" in row["message"]
 
 
