@@ -23,6 +23,7 @@ class Outcome:
     detail : a sentence on this ending; the sentence of the status when there is no more to say.
     state : u, shape (U,), the last state that the method reached.
     residual_norm : ‖R(u)‖₂ over the problem's scale, which the driver computes.
+    residual_absolute : ‖R(u)‖₂ in the unit of the problem; NaN when nothing was solved.
     rows : one dictionary for each step, in order; `steps` gives them as a frame.
     claimed_wrongly : True when the method, or a stopping test other than that of residuals, accepted a state whose
         residual is not small.
@@ -43,6 +44,7 @@ class Outcome:
     blame: Mapping[str, float] = field(default_factory=dict)
     counts: Mapping[str, int] = field(default_factory=dict)
     seconds: Mapping[str, float] = field(default_factory=dict)
+    residual_absolute: float = float("nan")
 
     @property
     def converged(self) -> bool:

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Generator
 from dataclasses import dataclass, replace
-from typing import ClassVar
+from typing import ClassVar, Literal, Self
 
 import numpy as np
-from pydantic import Field, ValidationInfo, field_validator
+from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from nlsolve.contracts.component import Component
 from nlsolve.contracts.continuum.law import ConstitutiveLaw
@@ -20,6 +20,12 @@ from nlsolve.series import Array
 
 LOAD = "load"
 """The value of `by` that is no field of the law: it varies a factor on boundary velocities and body forces."""
+
+REST = "rest"
+"""The value of `at` with which a march begins at rest."""
+
+CONTINUATION = ("by", "values", "adaptive", "smallest", "iterations", "tolerance", "solver")
+"""The fields of a `Start` that say how its stages are solved; a march from rest has none."""
 
 EASY = 8  # a stage solved in so many iterations or fewer was easy: the next step is doubled
 
@@ -43,12 +49,19 @@ class Start(Component):
     in steps of log(`by`), which are halved when a stage fails and doubled when it was easy. With no values, the method
     of the case solves a steady scene from rest.
 
+    A march may also begin at rest: V = 0 inside at t = 0, on the boundary what is prescribed there, and nothing is
+    solved before the first increment. What that costs is counted in the march; all `start_…` columns are 0.
+
     A perturbation moves the guess that each solve by the method of the case begins with: in a steady scene the state
     after the continuation (or rest), in a march the state that each increment begins with. The equations stay the same.
     """
 
     noun: ClassVar[str] = "start"
 
+    at: Literal["state", "rest"] = Field(
+        "state",
+        description="what a march begins with at t = 0: the quasi-static state, by continuation, or V = 0 inside",
+    )
     by: str = Field(
         "index",
         description="what is varied: a field of the law, as index (from 1) or regularization (from large), or load",
@@ -71,6 +84,17 @@ class Start(Component):
     def _nothing_to_draw(cls, seed: int, info: ValidationInfo) -> int:
         return seed if info.data.get("perturbation") else 0
 
+    @model_validator(mode="after")
+    def _rest_has_no_continuation(self) -> Self:
+        if self.at == REST:
+            usual = Start()
+            for name in CONTINUATION:
+                if getattr(self, name) != getattr(usual, name):
+                    raise ValueError(
+                        f'{name}: a march from rest has no continuation: leave it out, or set at = "state"'
+                    )
+        return self
+
     def disturbed(self, flow: Flow, u: Array, increment: int) -> Array:
         """u + ε ‖V‖₂ g/‖g‖₂ with V the velocities of all nodes and g normal, drawn anew for each increment."""
         if not self.perturbation:
@@ -79,7 +103,12 @@ class Start(Component):
         return u + self.perturbation * np.linalg.norm(flow.velocity(u)) / np.linalg.norm(g) * g
 
     def stages(self, law: ConstitutiveLaw) -> list[Stage]:
-        """The stages of `values`, in order, and the target last. Raises ValueError when the law refuses the values."""
+        """The stages of `values`, in order, and the target last; none for a march from rest.
+
+        Raises ValueError when the law refuses the values.
+        """
+        if self.at == REST:
+            return []
         if self.by == LOAD:
             path = (*self.values, 1.0)
             if min(path) <= 0.0 or (np.diff(path) <= 0.0).any():

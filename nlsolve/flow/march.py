@@ -13,7 +13,7 @@ from nlsolve.contracts.outcome import Outcome
 from nlsolve.contracts.problem import NonlinearProblem
 from nlsolve.contracts.scene import Entry, Simulation, Solve, Workload
 from nlsolve.contracts.status import SolveError, Status
-from nlsolve.flow.continuation import Solves, Stage, walk
+from nlsolve.flow.continuation import REST, Solves, Stage, walk
 from nlsolve.flow.incompressibility import iterate_pressure
 from nlsolve.flow.momentum import Flow
 from nlsolve.flow.moving_nodes import Markers
@@ -24,7 +24,8 @@ from nlsolve.series import Array
 
 
 class FlowSimulation(Simulation):
-    """The flow of one case: a quasi-static first state reached by continuation, then time steps by implicit Euler.
+    """The flow of one case: a quasi-static first state reached by continuation, or rest, then time steps by implicit
+    Euler.
 
     A steady flow is its first state; the last stage of the continuation is then solved by the method of the case.
     """
@@ -41,12 +42,16 @@ class FlowSimulation(Simulation):
         self.before: Array | None = None  # velocity one increment earlier
         self.reached = 0.0  # time of the last solved increment
         self.probe: int | None = None
+        self.rest: Array | None = None  # velocity at t = 0 of a march that begins at rest
 
     def solves(self) -> Solves:
         """Yields the problems of the first state and of each increment, until one fails. May raise SolveError."""
         self.begin()
-        outcome = yield from self.first_state()
-        for k in range(1, self.increments + 1):
+        if self.parts.start.at == REST:
+            done, outcome = 1, (yield from self.first_increment_from_rest())
+        else:
+            done, outcome = 0, (yield from self.first_state())
+        for k in range(done + 1, self.increments + 1):
             if outcome.status is not Status.CONVERGED:
                 break
             outcome = yield from self.advance(k)
@@ -92,15 +97,36 @@ class FlowSimulation(Simulation):
 
         outcome, stage = yield from walk(parts.start, parts.law, solve_stage)
         if outcome.status is Status.CONVERGED:
-            if parts.motion.markers or parts.motion.shifting:
-                self.markers = Markers(
-                    parts.scene, parts.time.increment, parts.discretizer, self.initial, state.velocity
-                )
-            self.record_fields_if_due()
+            assert state.flow is not None
+            self.record_beginning(state.flow)
         elif self.increments or stage.load < 1.0 or stage.law is not parts.law:
             detail = f"on the way to the first state, at {parts.start.by} = {stage.value:g}: {outcome.detail}"
             return replace(outcome, detail=detail)
         return outcome
+
+    def first_increment_from_rest(self) -> Solves:
+        """V(t = 0) = 0 inside, and what is prescribed on the boundary; the method of the case solves increment 1.
+
+        Within it V grows linearly for nodes and markers. V has then jumped to the flow, and later increments do not
+        extrapolate over that. May raise SolveError.
+        """
+        flow = self.state.flow_of(self.parts.law)
+        self.rest = self.state.velocity = flow.velocity(flow.unknowns(self.state.guess))
+        self.record_beginning(flow)
+        outcome = yield from self.advance(1)
+        self.past = []
+        if self.markers is not None:
+            self.markers.forget_earlier()
+        return outcome
+
+    def record_beginning(self, flow: Flow) -> None:
+        """Record t = 0, and set out the markers there."""
+        parts = self.parts
+        if parts.motion.markers or parts.motion.shifting:
+            self.markers = Markers(
+                parts.scene, parts.time.increment, parts.discretizer, self.initial, self.state.velocity
+            )
+        self.record_fields_if_due(flow)
 
     def prepare(self, stage: Stage) -> Solves:
         """Yields the problem of one stage on the way to the first state."""
@@ -123,7 +149,8 @@ class FlowSimulation(Simulation):
             self.before = previous
             if self.markers is not None:
                 self.markers.advance(state.cloud, state.velocity, state.time)
-            self.record_fields_if_due()
+            assert state.flow is not None
+            self.record_fields_if_due(state.flow)
         return outcome
 
     def increment(self, k: int, flow: Flow) -> Solves:
@@ -133,13 +160,12 @@ class FlowSimulation(Simulation):
 
     # What is recorded and measured.
 
-    def record_fields_if_due(self) -> None:
+    def record_fields_if_due(self, flow: Flow) -> None:
         """Record the fields when the time is within half an increment of a recorded time or of the horizon."""
         parts, now = self.parts, self.state
         asked = (*parts.record.times, parts.time.horizon or 0.0)
         if any(abs(now.time - moment) < 0.5 * parts.time.increment for moment in asked):
-            assert now.flow is not None
-            fields = nodal_fields(parts.scene, parts.discretizer, now.flow, now.velocity, self.initial, now.time)
+            fields = nodal_fields(parts.scene, parts.discretizer, flow, now.velocity, self.initial, now.time)
             places = np.full_like(self.initial.nodes, np.nan) if self.markers is None else self.markers.places
             self.snapshots.append(fields.assign(marker_x=places[:, 0], marker_y=places[:, 1]))
 
@@ -181,13 +207,14 @@ class FlowSimulation(Simulation):
 
     def sample(self) -> tuple[NonlinearProblem, Array]:
         """The problem at t = 0, and the state (2F,) that one Newton step from rest reaches in the first stage of the
-        continuation. When the law of that stage is Newtonian, the state is a Newtonian flow.
+        continuation, or in the problem itself when the march begins at rest. When the law of that stage is Newtonian,
+        the state is a Newtonian flow.
 
         May raise SolveError.
         """
         parts, state = self.parts, self.state
         self.begin()
-        first = parts.start.stages(parts.law)[0]
+        first = next(iter(parts.start.stages(parts.law)), Stage(parts.law, 1.0, 1.0))
         easiest = state.flow_of(first.law, load=first.load)
         rest = easiest.unknowns(state.velocity)
         factors = parts.linear.factorize(easiest.jacobian(rest))

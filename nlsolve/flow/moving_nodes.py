@@ -94,6 +94,10 @@ class Markers:
         self.places[followed] = moved
         self.places[self.initial.boundary] = self.scene.boundary_position(self.initial, time)
 
+    def forget_earlier(self) -> None:
+        """Forget all velocities but the last: V changes so fast before it that no polynomial goes through both."""
+        self._known = self._known[:1]
+
     def _velocity_at(self, field: NodalField, places: Array) -> Array:
         values = self.discretizer.values
         return np.sum([values(nodes, within(nodes, places)) @ velocity for nodes, velocity in field], axis=0)

@@ -6,6 +6,7 @@ from abc import ABC
 from collections.abc import Mapping
 from typing import Any, ClassVar
 
+import numpy as np
 from pydantic import ValidationError
 
 from nlsolve.contracts.continuum.discretizer import Discretizer
@@ -14,7 +15,7 @@ from nlsolve.contracts.continuum.law import ConstitutiveLaw
 from nlsolve.contracts.continuum.terms import NodeMotion, Physics, Recording, TimeSteps
 from nlsolve.contracts.rules.predictor import Predictor
 from nlsolve.contracts.scene import Entry, Misfit, Scene, Section
-from nlsolve.flow.continuation import LOAD, Start
+from nlsolve.flow.continuation import LOAD, REST, Start
 from nlsolve.flow.march import FlowSimulation
 from nlsolve.flow.state import FlowParts
 
@@ -40,7 +41,7 @@ class FlowScene(Geometry, Scene, ABC):
 
     def check(self, parts: Any) -> None:
         """Raises Misfit when nodes move that must stay, when moving nodes are combined with convection, or when the law
-        refuses the continuation to the first state.
+        refuses the start: its continuation to the first state, or rest.
         """
         if parts.motion.moving and self.keeps_nodes:
             raise Misfit("motion", "nodes", f'{self.keeps_nodes}; use nodes = "fixed"')
@@ -50,6 +51,8 @@ class FlowScene(Geometry, Scene, ABC):
                 "convection",
                 'nodes that move with the material carry it already; use motion.nodes = "fixed"',
             )
+        if parts.start.at == REST:
+            self._check_rest(parts)
         try:
             parts.start.stages(parts.law)
         except ValidationError as error:
@@ -59,3 +62,16 @@ class FlowScene(Geometry, Scene, ABC):
             raise Misfit(
                 "start", "values" if parts.start.by == LOAD else "by", str(error).partition(": ")[2]
             ) from error
+
+    def _check_rest(self, parts: Any) -> None:
+        if not parts.time.increments:
+            raise Misfit("start", "at", "a steady scene has no increment to begin: set time.horizon, or values = []")
+        with np.errstate(all="ignore"):
+            viscosity = parts.law.viscosity(np.zeros(1))
+        if not np.isfinite(viscosity).all():
+            raise Misfit(
+                "start",
+                "at",
+                "the law has no finite viscosity at ε̄ = 0, where the march would begin: "
+                'choose law.regularization > 0, or at = "state"',
+            )

@@ -122,6 +122,12 @@ RUNS = _by_name(
         "largest relative residual accepted in any increment, evaluated outside the method",
         symbol="relative residual",
     ),
+    Column(
+        "residual_absolute",
+        "largest ‖R‖₂ accepted in any increment, in the unit of the problem: N/mm³ for a flow, N/mm in a conservative "
+        "form of it",
+        symbol=r"$\|R\|_2$",
+    ),
     Column("divergence", "‖div V‖/‖ε̄‖ over volume points and strain points at the end, with a volumetric term"),
     Column(
         "velocity_error",
@@ -216,6 +222,11 @@ STEPS = _by_name(
     Column("tangents", "tangents factorised so far in the march"),
     Column("triangular_solves", "pairs of triangular solves so far in the march"),
     Column("residual_norm", "relative residual at the step", symbol="relative residual"),
+    Column(
+        "residual_absolute",
+        "‖R‖₂ at the step, in the unit of the problem: N/mm³ for a flow, N/mm in a conservative form of it",
+        symbol=r"$\|R\|_2$",
+    ),
     Column(
         "difference",
         "relative difference from the step before, in the norm of the stopping test",

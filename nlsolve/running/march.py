@@ -34,7 +34,7 @@ class March:
     outcome : how the march ended; the states before a failure are kept.
     row : its row of `runs`.
     steps : one row for each iteration or series.
-    times : t = 0, the time of the first state, and the ends of the increments, shape (K,) [s].
+    times : t = 0, the time of the first state or of rest, and the ends of the increments, shape (K,) [s].
     nodes, velocities : at these times, shape (K, N, 2) [mm], [mm/s].
     parts : the validated component of each section of the case.
     """
@@ -119,6 +119,8 @@ def march(
     def watch(simulation: Simulation) -> None:
         if not isinstance(simulation, FlowSimulation):
             raise InputError(f"nlsolve.march: the scene {parts.scene.kind_name()!r} is no flow: use nlsolve.run")
+        if simulation.rest is not None:
+            states.setdefault(0.0, (simulation.initial.nodes, simulation.rest))
         states[simulation.state.time] = simulation.state.cloud.nodes, simulation.state.velocity
 
     record = run_case(parts, listen, watch=watch)

@@ -59,6 +59,7 @@ def solve(
             blame,
             {"tangents": tangent.renewals - renewals, **spent.counted()},
             spent.timed(),
+            float(size),
         )
 
     if not np.isfinite(scale):
@@ -88,6 +89,7 @@ def solve(
             "tangents": tangent.renewals,
             "triangular_solves": ledger.counts["triangular_solve"],
             "residual_norm": residual_norm,
+            "residual_absolute": size,
             "difference": difference,
             "seconds": ledger.seconds["method"],
         }

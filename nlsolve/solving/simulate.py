@@ -154,7 +154,7 @@ class _Run:
         self.increments = self.iterations = 0
         self.time = 0.0
         self.validity_time: float | None = None
-        self.residual_norm = float("nan")
+        self.residual_norm = self.residual_absolute = float("nan")
         self.false_convergence = self.false_failure = 0
         self.blame: Mapping[str, float] = {}
         self.kept: tuple[NonlinearProblem, Array] | None = None
@@ -206,8 +206,10 @@ class _Run:
         self.rows += [{"increment": k, "time": task.time, "accepted": False, **row} for row in outcome.rows]
         if self.validity_time is None and self.simulation.increments and self.tangent.renewals > 1:
             self.validity_time = self.time
-        before = self.residual_norm if k else np.nan  # a steady state may be solved again: its last solve counts
-        self.residual_norm = float(np.fmax(before, outcome.residual_norm))
+        if not k:  # a steady state may be solved again: its last solve counts
+            self.residual_norm = self.residual_absolute = np.nan
+        self.residual_norm = float(np.fmax(self.residual_norm, outcome.residual_norm))
+        self.residual_absolute = float(np.fmax(self.residual_absolute, outcome.residual_absolute))
         if outcome.status is Status.CONVERGED:
             self.increments, self.time = max(k, 1), task.time
             self.rows[-1] |= {"accepted": True, **self.keep(task, outcome)}
@@ -258,6 +260,7 @@ class _Run:
             "seconds_all": ledger.seconds["method"] + ledger.seconds["operators"] + start.seconds["stage"],
             **self.tangent.facts(),
             "residual_norm": self.residual_norm,
+            "residual_absolute": self.residual_absolute,
             **run_columns({**self.simulation.sizes, **self.simulation.measured(outcome)}),
         }
 

@@ -324,6 +324,18 @@ def test_one_step_of_every_increment_is_accepted_and_all_are_told() -> None:
     assert record.summary["iterations"] == record.summary["triangular_solves"]
 
 
+def test_the_absolute_residual_of_a_march_is_the_largest_accepted() -> None:
+    """In N/mm³: ‖R‖₂ of the problem at each step, and the relative residual times the size of its forces."""
+    record = march(marching(3, stop=StoppingTest(tolerance=1e-6)))
+    accepted = record.steps[record.steps["accepted"]]
+    assert record.summary["residual_absolute"] == accepted["residual_absolute"].max()
+    assert record.problem is not None
+    assert record.state is not None
+    last = np.linalg.norm(record.problem.residual(record.state))
+    assert accepted["residual_absolute"].iloc[-1] == pytest.approx(last, rel=1e-12)
+    assert (record.steps["residual_absolute"] > record.steps["residual_norm"]).all()
+
+
 # Branches and validity: how long the first tangent of the march served.
 
 

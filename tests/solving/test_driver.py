@@ -237,6 +237,7 @@ def test_a_note_without_a_column_is_kept_under_its_name() -> None:
 def test_a_note_does_not_take_the_place_of_what_the_driver_measured() -> None:
     outcome, _ = run(IDENTITY, Noting(), None, ONE)
     assert (outcome.rows[1]["step"], outcome.rows[1]["residual_norm"]) == (1, 0.5)
+    assert outcome.rows[1]["residual_absolute"] == 0.5
 
 
 # Stopping tests.
@@ -251,6 +252,17 @@ def test_stopping_by_residual_is_relative_to_the_scale_of_the_problem() -> None:
     outcome, _ = run(Scaled(lambda u: 1.0 * u), walk, None, ONE, stop=StoppingTest(tolerance=1e-3))
     assert outcome.state[0] == 0.05
     assert outcome.residual_norm == pytest.approx(5e-4)
+
+
+def test_the_residual_is_told_in_its_own_unit_too() -> None:
+    class Scaled(Scalar):
+        def scale(self, u: np.ndarray) -> float:
+            return 100.0
+
+    walk = Walk(states=(0.5, 0.05, 0.005))
+    outcome, _ = run(Scaled(lambda u: 3.0 * u), walk, None, ONE, stop=StoppingTest(tolerance=2e-3))
+    assert outcome.residual_absolute == pytest.approx(0.15)
+    assert [row["residual_absolute"] for row in outcome.rows] == [3.0 * state for state in (1.0, 0.5, 0.05)]
 
 
 def test_stopping_by_difference_wants_two_steps() -> None:
