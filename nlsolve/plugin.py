@@ -12,18 +12,21 @@ from nlsolve.contracts.linear_solver import Factors, LinearSolver
 from nlsolve.contracts.nonlinear_solver import KeptTangent, NonlinearSolver, Step
 from nlsolve.contracts.problem import Expansion, NonlinearProblem
 from nlsolve.contracts.rules.globalization import Globalization, Search
+from nlsolve.contracts.rules.operator import Assembly, IterationOperator
 from nlsolve.contracts.rules.predictor import Predictor
 from nlsolve.contracts.rules.refresh import RefreshRule, TangentHistory
 from nlsolve.contracts.scene import Entry, Misfit, Preparation, Scene, Section, Simulation, SingleSolve, Solve, Workload
 from nlsolve.contracts.status import SolveError, Status
 from nlsolve.flow.scene import FlowScene
 from nlsolve.registry.hookspecs import hookimpl
-from nlsolve.registry.nested import Globalized
+from nlsolve.registry.nested import AnyDiscretizer, Globalized
 from nlsolve.series import NoSeries, Series, as_column
 from nlsolve.solving.anderson_mixing import Mixing
 from nlsolve.solving.cached_jacobian import cached_jacobian
 
 __all__ = [
+    "AnyDiscretizer",
+    "Assembly",
     "Cloud",
     "Component",
     "ConstitutiveLaw",
@@ -35,6 +38,7 @@ __all__ = [
     "FlowScene",
     "Globalization",
     "Globalized",
+    "IterationOperator",
     "KeptTangent",
     "LinearSolver",
     "Misfit",

@@ -11,6 +11,7 @@ from typing import Annotated, Any
 from pydantic import BeforeValidator, SerializeAsAny
 
 from nlsolve.contracts.component import Component
+from nlsolve.contracts.continuum.discretizer import Discretizer
 from nlsolve.contracts.nonlinear_solver import NonlinearSolver
 from nlsolve.contracts.rules.globalization import Globalization
 from nlsolve.registry.registry import load_registry
@@ -30,3 +31,6 @@ Globalized = Annotated[SerializeAsAny[Globalization], installed(Globalization)]
 
 AnySolver = Annotated[SerializeAsAny[NonlinearSolver], installed(NonlinearSolver)]
 """The type of a field that holds a nonlinear solver."""
+
+AnyDiscretizer = Annotated[SerializeAsAny[Discretizer], installed(Discretizer)]
+"""The type of a field that holds a discretizer."""

@@ -25,6 +25,7 @@ from nlsolve.contracts.continuum.law import ConstitutiveLaw
 from nlsolve.contracts.linear_solver import LinearSolver
 from nlsolve.contracts.nonlinear_solver import NonlinearSolver
 from nlsolve.contracts.rules.globalization import Globalization
+from nlsolve.contracts.rules.operator import IterationOperator
 from nlsolve.contracts.rules.predictor import Predictor
 from nlsolve.contracts.rules.refresh import RefreshRule
 from nlsolve.contracts.scene import Scene
@@ -40,6 +41,7 @@ CONTRACTS: dict[str, type[Component]] = {
         LinearSolver,
         NonlinearSolver,
         RefreshRule,
+        IterationOperator,
         Predictor,
         Globalization,
     )
