@@ -22,7 +22,7 @@ from nlsolve.registry.hookspecs import hookimpl
 from nlsolve.registry.nested import AnyDiscretizer, Globalized
 from nlsolve.series import NoSeries, Series, as_column
 from nlsolve.solving.anderson_mixing import Mixing
-from nlsolve.solving.cached_jacobian import cached_jacobian
+from nlsolve.solving.matrices import cached_jacobian
 
 __all__ = [
     "AnyDiscretizer",

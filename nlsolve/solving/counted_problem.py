@@ -12,8 +12,8 @@ from nlsolve.contracts.problem import Expansion, NonlinearProblem
 from nlsolve.contracts.status import SolveError, Status
 from nlsolve.series import Array, NoSeries
 from nlsolve.solving.counted_matrix import CountedMatrix, counted
-from nlsolve.solving.iteration_operator import CheckedOperator
 from nlsolve.solving.ledger import Ledger
+from nlsolve.solving.matrices import CheckedOperator
 
 
 class CountedExpansion(Expansion):

@@ -14,8 +14,8 @@ from nlsolve.contracts.rules.refresh import RefreshRule, TangentHistory
 from nlsolve.contracts.status import SolveError, Status
 from nlsolve.series import Array
 from nlsolve.solving.counted_matrix import CountedMatrix, counted, plain
-from nlsolve.solving.iteration_operator import CheckedOperator
 from nlsolve.solving.ledger import Ledger
+from nlsolve.solving.matrices import CheckedOperator
 
 SMALLEST = 1e-16  # a smaller contraction is rounding, and counts as this one
 RECENT = 10.0  # solves after which an earlier rate weighs 1/e

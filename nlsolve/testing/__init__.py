@@ -14,9 +14,8 @@ from __future__ import annotations
 from nlsolve.testing.discretizers import check_discretizer
 from nlsolve.testing.laws import check_law
 from nlsolve.testing.linear_solvers import check_linear_solver
-from nlsolve.testing.operators import check_operator
 from nlsolve.testing.problems import check_problem
-from nlsolve.testing.rules import check_globalization, check_predictor, check_refresh_rule
+from nlsolve.testing.rules import check_globalization, check_operator, check_predictor, check_refresh_rule
 from nlsolve.testing.scenes import check_scene, check_system
 from nlsolve.testing.solvers import check_solver
 

@@ -15,8 +15,8 @@ from nlsolve.contracts.rules.refresh import RefreshRule
 from nlsolve.contracts.status import Status
 from nlsolve.series import Array
 from nlsolve.solving.driver import solve
-from nlsolve.solving.iteration_operator import CheckedOperator
 from nlsolve.solving.ledger import Ledger
+from nlsolve.solving.matrices import CheckedOperator
 from nlsolve.solving.stopping import Budget, StoppingTest
 from nlsolve.solving.tangent import Tangent
 from nlsolve.testing.promises import require, same

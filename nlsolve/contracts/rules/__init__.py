@@ -1,1 +1,1 @@
-"""The contracts of rules that methods share: when K* is renewed, where an increment begins, how long a step may be."""
+"""Contracts of rules that methods share: what K* is made of, when it is renewed, where an increment begins, step lengths."""

@@ -57,8 +57,8 @@ from nlsolve.plugin import (
 )
 from nlsolve.solving.counted_problem import CountedProblem
 from nlsolve.solving.driver import solve
-from nlsolve.solving.iteration_operator import CheckedOperator, checked
 from nlsolve.solving.ledger import Ledger
+from nlsolve.solving.matrices import CheckedOperator, checked
 from nlsolve.solving.simulate import run_case
 from nlsolve.solving.stopping import Budget, StoppingTest
 from nlsolve.solving.tangent import Tangent

@@ -1,4 +1,4 @@
-"""The matrices K* of one case as its iteration operator makes them, checked, with sentences that name the operator."""
+"""The matrices of one case: K* as its iteration operator makes it, checked, and J(u), kept while u stays the same."""
 
 from __future__ import annotations
 
@@ -55,3 +55,28 @@ class CheckedOperator:
 def checked(operator: IterationOperator) -> CheckedOperator | None:
     """The operator for one march; None when K* is J(u), which needs neither memory nor check."""
     return None if operator.is_tangent else CheckedOperator(operator)
+
+
+class CachedJacobian:
+    """u -> J(u), sparse (U, U), which keeps the last J.
+
+    For a method that both factorises J into K* and multiplies with it at the same u (U,).
+    """
+
+    def __init__(self, problem: NonlinearProblem) -> None:
+        self._problem = problem
+        self._last: tuple[Array, Any] | None = None
+
+    def __call__(self, u: Array) -> Any:
+        if self._last is None or not np.array_equal(self._last[0], u):
+            self._last = u.copy(), self._problem.jacobian(u)
+        return self._last[1]
+
+    def operator(self, u: Array) -> Any:
+        """What K* is made of at u, sparse (U, U): the J that is kept, unless the case has another operator."""
+        return self(u) if self._problem.operator_is_jacobian else self._problem.operator(u)
+
+
+def cached_jacobian(problem: NonlinearProblem) -> CachedJacobian:
+    """J of a problem, kept while u stays the same."""
+    return CachedJacobian(problem)
