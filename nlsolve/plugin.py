@@ -13,6 +13,7 @@ from nlsolve.contracts.nonlinear_solver import KeptTangent, NonlinearSolver, Ste
 from nlsolve.contracts.problem import Expansion, NonlinearProblem
 from nlsolve.contracts.rules.globalization import Globalization, Search
 from nlsolve.contracts.rules.homotopy_form import HomotopyForm, Recurrence
+from nlsolve.contracts.rules.operator import Assembly, IterationOperator
 from nlsolve.contracts.rules.predictor import Predictor
 from nlsolve.contracts.rules.range_rule import Range, RangeRule, SeriesBranch
 from nlsolve.contracts.rules.refresh import RefreshRule, TangentHistory
@@ -20,14 +21,16 @@ from nlsolve.contracts.scene import Entry, Misfit, Preparation, Scene, Section, 
 from nlsolve.contracts.status import SolveError, Status
 from nlsolve.flow.scene import FlowScene
 from nlsolve.registry.hookspecs import hookimpl
-from nlsolve.registry.nested import AnyForm, AnyRange, Globalized
+from nlsolve.registry.nested import AnyDiscretizer, AnyForm, AnyRange, Globalized
 from nlsolve.series import NoSeries, Series, as_column
 from nlsolve.solving.anderson_mixing import Mixing
-from nlsolve.solving.cached_jacobian import cached_jacobian
+from nlsolve.solving.matrices import cached_jacobian
 
 __all__ = [
+    "AnyDiscretizer",
     "AnyForm",
     "AnyRange",
+    "Assembly",
     "Cloud",
     "Component",
     "ConstitutiveLaw",
@@ -40,6 +43,7 @@ __all__ = [
     "Globalization",
     "Globalized",
     "HomotopyForm",
+    "IterationOperator",
     "KeptTangent",
     "LinearSolver",
     "Misfit",

@@ -8,6 +8,7 @@ from typing import Any
 from nlsolve_discretizers import MovingLeastSquares
 from nlsolve_laws import PowerLaw
 from nlsolve_linear.superlu import SuperLU
+from nlsolve_rules.operators import TangentHere
 from nlsolve_rules.predictors import Previous
 from nlsolve_rules.refresh import EveryIteration
 from nlsolve_scenes import StirringTool
@@ -21,6 +22,7 @@ from nlsolve.flow.momentum import Flow
 from nlsolve.plugin import (
     ConstitutiveLaw,
     Discretizer,
+    IterationOperator,
     LinearSolver,
     NodeMotion,
     NonlinearProblem,
@@ -85,6 +87,7 @@ class FlowCase:
     refresh: RefreshRule
     predictor: Predictor
     error_estimator: Discretizer | None = None
+    operator: IterationOperator = field(default_factory=TangentHere)
     physics: Physics = field(default_factory=Physics)
     time: TimeSteps = field(default_factory=TimeSteps)
     motion: NodeMotion = field(default_factory=NodeMotion)
@@ -116,5 +119,6 @@ class SystemParts:
     linear: LinearSolver = PLAIN
     solver: NonlinearSolver = field(default_factory=Newton)
     refresh: RefreshRule = field(default_factory=EveryIteration)
+    operator: IterationOperator = field(default_factory=TangentHere)
     stop: StoppingTest = field(default_factory=StoppingTest)
     budget: Budget = field(default_factory=Budget)

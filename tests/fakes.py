@@ -20,6 +20,7 @@ from nlsolve.plugin import (
     Discretizer,
     Factors,
     FlowScene,
+    IterationOperator,
     LinearSolver,
     NonlinearSolver,
     Operators,
@@ -141,6 +142,16 @@ class EveryIteration(RefreshRule):
         return True
 
 
+class TangentHere(IterationOperator):
+    """The default operator."""
+
+    kind: Literal["tangent"] = "tangent"
+    is_tangent: ClassVar[bool] = True
+
+    def matrix(self, problem: Any, u: Any) -> Any:
+        return problem.jacobian(u)
+
+
 class EveryM(RefreshRule):
     """A rule with a parameter."""
 
@@ -164,7 +175,7 @@ class Previous(Predictor):
         return past[0]
 
 
-COMPONENTS = (Box, Honey, Grid, Dense, Newton, Homotopy, EveryIteration, EveryM, Previous)
+COMPONENTS = (Box, Honey, Grid, Dense, Newton, Homotopy, EveryIteration, EveryM, TangentHere, Previous)
 
 
 class Plugin:

@@ -2,7 +2,7 @@
 
 while True:
     yield Step(state)
-    tangent.refresh_if_due(lambda: problem.jacobian(state))
+    tangent.refresh_if_due(lambda: problem.operator(state))
     state = state - tangent.solve(problem.residual(state))
 """
 
@@ -41,9 +41,10 @@ class KeptTangent(ABC):
     def refresh_if_due(self, assemble: Callable[[], Any]) -> bool:
         """Factorise the matrix that `assemble` returns when there is no K* yet or the refresh rule asks for one.
 
-        assemble : called only then. Returns a Jacobian of the problem, a matrix computed from it, or any other sparse
-            (U, U) matrix.
-        Returns True when K* was renewed. Raises SolveError when the matrix cannot be factorised.
+        assemble : called only then. Returns the iteration operator that the case has chosen (`problem.operator`), or a
+            matrix of the method's own, sparse (U, U).
+        Returns True when K* was renewed; False also when the rule asks and the operator has no other K*. Raises
+        SolveError when the matrix cannot be factorised.
         """
 
     @abstractmethod
@@ -71,6 +72,11 @@ class NonlinearSolver(Component, ABC):
     """The refresh rule used when a study names none."""
     claims: ClassVar[bool] = False
     """True when the method's steps can carry `claim`, so that `stop = { kind = "claim" }` makes sense."""
+
+    uses_operator: ClassVar[bool] = False
+    """True when K* is `problem.operator(u)` in every step, so that a case may choose its iteration operator; False when
+    the method factorises a matrix of its own.
+    """
 
     @abstractmethod
     def steps(self, problem: NonlinearProblem, tangent: KeptTangent, start: Array) -> Iterator[Step]:

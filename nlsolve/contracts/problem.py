@@ -49,6 +49,8 @@ class NonlinearProblem(ABC):
     does not define what it needs.
     """
 
+    operator_is_jacobian: bool = True
+    """False when `operator` gives another matrix than `jacobian`."""
     is_gradient: bool = False
     """True when R is the gradient of a convex potential, so that R(u + t w)·w grows with t for every direction w."""
 
@@ -69,6 +71,10 @@ class NonlinearProblem(ABC):
             "residual only, such as scipy-root with precondition = false",
         )
 
+    def operator(self, u: Array) -> Any:
+        """What K* is made of at u, a sparse (U, U) matrix: J(u), unless the case has another iteration operator."""
+        return self.jacobian(u)
+
     def expand(self, u: Array) -> Expansion:
         """The expansion of R around u. Raises SolveError (not applicable) when the problem has none."""
         raise SolveError(
@@ -87,6 +93,29 @@ class NonlinearProblem(ABC):
             Status.NOT_APPLICABLE,
             f"{type(self).__name__} has no secant matrix A(u) with R(u) = A(u) u + c(u): choose a method that needs "
             "its Jacobian only, such as newton or anderson",
+        )
+
+    def newtonian(self, u: Array, rate: float | None) -> Any:
+        """J(u) as if the viscosity were that of one strain rate ε̄ [1/s] everywhere, a sparse (U, U) matrix.
+
+        rate : ε̄; None: the problem's own reference rate.
+        Raises SolveError (not applicable) for a problem without a viscosity, or without a rate.
+        """
+        raise SolveError(
+            Status.NOT_APPLICABLE,
+            f"{type(self).__name__} has no viscosity, and so no Newtonian operator: choose another operator, such as "
+            "tangent or diagonal",
+        )
+
+    def jacobian_by(self, discretizer: Any, u: Array) -> Any:
+        """J(u) of the same equations by another discretizer, a sparse (U, U) matrix whose rows have the units of R.
+
+        Raises SolveError (not applicable) for a problem that no discretizer has made.
+        """
+        raise SolveError(
+            Status.NOT_APPLICABLE,
+            f"{type(self).__name__} knows no other discretization of its equations: choose another operator, such as "
+            "tangent or diagonal",
         )
 
     def blame(self, u: Array, residual: Array) -> Mapping[str, float]:

@@ -12,11 +12,13 @@ from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
+from scipy.spatial import cKDTree
 
 from nlsolve.contracts.continuum.cloud import Cloud
-from nlsolve.contracts.continuum.discretizer import Operators
+from nlsolve.contracts.continuum.discretizer import Discretizer, Operators
 from nlsolve.contracts.continuum.law import ConstitutiveLaw, Number, rate_squared, stress, tangent_moduli
 from nlsolve.contracts.problem import Expansion, NonlinearProblem
+from nlsolve.contracts.status import SolveError, Status
 from nlsolve.series import Array, Series
 
 
@@ -46,6 +48,7 @@ class Flow(NonlinearProblem):
     penalty_modulus : λ [MPa s], one or (L,); the volumetric term is present when the operators have one.
     pressure : p at the volume points, shape (L,) [MPa], for the iterated penalty.
     inertia, convection, body_force : present when given; f at the interior nodes, shape (F, 2) [N/mm³].
+    reference_rate : ε̄ [1/s] at which a Newtonian operator takes the viscosity when none is given.
     """
 
     def __init__(
@@ -59,8 +62,11 @@ class Flow(NonlinearProblem):
         inertia: Inertia | None = None,
         convection: Convection | None = None,
         body_force: Array | None = None,
+        reference_rate: float | None = None,
     ) -> None:
         self.cloud, self.operators, self.law = cloud, operators, law
+        self._terms = inertia, convection
+        self._reference_rate = reference_rate
         self.is_gradient = operators.is_conservative and convection is None
         self._free = node_major(cloud.interior)
         lifted = np.zeros(2 * len(cloud.nodes))
@@ -73,7 +79,9 @@ class Flow(NonlinearProblem):
         self._dilatation: Any = None
         self._inertia: Any = None
         self._carried: _Carried | None = None
-        areas = 1.0 if operators.node_areas is None else np.repeat(operators.node_areas, 2)
+        areas = self._areas = np.ones(len(self._free)) * (
+            1.0 if operators.node_areas is None else np.repeat(operators.node_areas, 2)
+        )
         constant = np.zeros(len(self._free))
         self._modulus: Array | None = None
         self._pressure: Array | float = 0.0 if pressure is None else pressure
@@ -89,7 +97,7 @@ class Flow(NonlinearProblem):
             self._inertia = areas * np.full(len(self._free), inertia.density_over_increment)
             constant -= self._inertia * inertia.previous[cloud.interior].ravel()
         if convection is not None:
-            self._carried = _Carried(convection, cloud, areas * np.ones(len(self._free)), lifted)
+            self._carried = _Carried(convection, cloud, areas, lifted)
         if body_force is not None:
             constant -= areas * body_force.ravel()
         self._constant = constant
@@ -125,6 +133,32 @@ class Flow(NonlinearProblem):
         """A = W ρ (1/Δt + v·∇) − S 2μ B − S_θ λ B_θ, viscosity and carrying velocity those of u (Picard, Oseen)."""
         carried = None if self._carried is None else self._carried.secant(u)
         return self._linearized(secant_moduli(self.law, self._strain_rate(u)), carried)
+
+    def newtonian(self, u: Array, rate: float | None) -> Any:
+        """A with one viscosity μ(rate²) at all points: the operator of a Newtonian material (Oseen's, when carried)."""
+        chosen = self._reference_rate if rate is None else rate
+        if chosen is None:
+            raise SolveError(
+                Status.NOT_APPLICABLE, "this flow has no reference rate: give the rate of the Newtonian operator"
+            )
+        viscosity = self.law.viscosity(np.array([chosen**2]))
+        carried = None if self._carried is None else self._carried.secant(u)
+        return self._linearized(isotropic(np.broadcast_to(viscosity, len(self.operators.strain.points))), carried)
+
+    def jacobian_by(self, discretizer: Discretizer, u: Array) -> Any:
+        """J of the same terms on the same nodes by another discretizer, its rows times W/W′ of the two node areas.
+
+        λ is that of the nearest volume point of this flow. Raises SolveError when the nodes carry no such operators.
+        """
+        others = discretizer.operators(self.cloud, self._modulus is not None)
+        modulus: float | Array = 0.0
+        if self._modulus is not None and self.operators.volumetric is not None and others.volumetric is not None:
+            tree = cKDTree(self.operators.volumetric.points)
+            modulus = self._modulus[tree.query(others.volumetric.points)[1]]
+        inertia, convection = self._terms
+        boundary = self._lifted[node_major(self.cloud.boundary)].reshape(-1, 2)
+        other = Flow(self.cloud, others, self.law, boundary, modulus, inertia=inertia, convection=convection)
+        return sp.diags_array(self._areas / other._areas) @ other.jacobian(u)
 
     def _linearized(self, moduli: Array, carried: Any) -> Any:
         """W ρ/Δt + carried − S C B − S_θ λ B_θ with pointwise moduli C (3, 3, M)."""
@@ -231,7 +265,12 @@ class _Carried:
 
 def secant_moduli(law: ConstitutiveLaw, strain_rate: Array) -> Array:
     """C = 2 μ I [MPa s], shape (3, 3, M), so that s = C ε̇, for strain rates (3, M) ordered xx, yy, xy."""
-    return 2.0 * np.eye(3)[:, :, None] * law.viscosity(rate_squared(strain_rate))
+    return isotropic(law.viscosity(rate_squared(strain_rate)))
+
+
+def isotropic(viscosity: Array) -> Array:
+    """C = 2 μ I [MPa s], shape (3, 3, M), of viscosities μ (M,)."""
+    return 2.0 * np.eye(3)[:, :, None] * viscosity
 
 
 def node_major(nodes: Any) -> Any:

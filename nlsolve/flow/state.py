@@ -142,6 +142,7 @@ class FlowState:
             inertia,
             Convection(physics.density, self.gradient) if self.gradient is not None else None,
             None if body_force is None else load * body_force,
+            self.scene.reference_rate,
         )
 
     def rate_squared_at_volume_points(self, operators: Operators) -> Array:

@@ -24,7 +24,8 @@ hookimpl = pluggy.HookimplMarker(PROJECT)
 @hookspec
 def nlsolve_components() -> Iterable[type[Component]]:  # type: ignore[empty-body]
     """The component classes that a plugin offers, of any contract: scenes, laws, discretizers, linear solvers, methods,
-    refresh rules, predictors, globalisations, range rules and homotopy forms.
+    refresh rules, iteration operators, predictors, globalisations, range rules and homotopy
+    forms.
 
     Called once a process, when the registry is loaded. A class declares its kind as a literal; its fields are the
     parameters that a study may set. The module honey.py, all of it:

@@ -12,6 +12,7 @@ from typing import Annotated, Any
 from pydantic import BeforeValidator, SerializeAsAny
 
 from nlsolve.contracts.component import Component
+from nlsolve.contracts.continuum.discretizer import Discretizer
 from nlsolve.contracts.nonlinear_solver import NonlinearSolver
 from nlsolve.contracts.rules.globalization import Globalization
 from nlsolve.contracts.rules.homotopy_form import HomotopyForm
@@ -43,3 +44,5 @@ AnyRange = Annotated[SerializeAsAny[RangeRule], installed(RangeRule, by_name=Tru
 
 AnyForm = Annotated[SerializeAsAny[HomotopyForm], installed(HomotopyForm, by_name=True)]
 """The type of a field that holds a homotopy form, by its table or its name."""
+AnyDiscretizer = Annotated[SerializeAsAny[Discretizer], installed(Discretizer)]
+"""The type of a field that holds a discretizer."""

@@ -26,6 +26,7 @@ from nlsolve.contracts.linear_solver import LinearSolver
 from nlsolve.contracts.nonlinear_solver import NonlinearSolver
 from nlsolve.contracts.rules.globalization import Globalization
 from nlsolve.contracts.rules.homotopy_form import HomotopyForm
+from nlsolve.contracts.rules.operator import IterationOperator
 from nlsolve.contracts.rules.predictor import Predictor
 from nlsolve.contracts.rules.range_rule import RangeRule
 from nlsolve.contracts.rules.refresh import RefreshRule
@@ -42,6 +43,7 @@ CONTRACTS: dict[str, type[Component]] = {
         LinearSolver,
         NonlinearSolver,
         RefreshRule,
+        IterationOperator,
         Predictor,
         Globalization,
         RangeRule,

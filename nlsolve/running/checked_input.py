@@ -16,6 +16,7 @@ from nlsolve.contracts.component import Component
 from nlsolve.contracts.linear_solver import LinearSolver
 from nlsolve.contracts.nonlinear_solver import NonlinearSolver
 from nlsolve.contracts.problem import NonlinearProblem
+from nlsolve.contracts.rules.operator import IterationOperator
 from nlsolve.contracts.rules.refresh import RefreshRule
 from nlsolve.contracts.status import InputError, SolveError
 from nlsolve.registry.problems import Problem, Source, problems_in
@@ -49,6 +50,7 @@ class Strategy:
     solver: NonlinearSolver
     linear: LinearSolver
     refresh: RefreshRule
+    operator: IterationOperator
     stop: StoppingTest
     budget: Budget
 
@@ -144,14 +146,14 @@ def _check_pattern(caller: str, compressed: FormulaProblem, full: FormulaProblem
 def _model() -> type[BaseModel]:
     """The pydantic model of a strategy: the sections that a study has for it."""
     registry = load_registry()
-    parts: dict[str, Any] = {noun: (registry.union(noun), ...) for noun in ("solver", "linear", "refresh")}
+    parts: dict[str, Any] = {noun: (registry.union(noun), ...) for noun in ("solver", "linear", "refresh", "operator")}
     parts |= {"stop": (StoppingTest, StoppingTest()), "budget": (Budget, Budget())}
     return create_model("Strategy", __config__=ConfigDict(extra="forbid", frozen=True), **parts)
 
 
-def strategy_of(caller: str, solver: Any, linear: Any, refresh: Any, stop: Any, budget: Any) -> Strategy:
+def strategy_of(caller: str, solver: Any, linear: Any, refresh: Any, operator: Any, stop: Any, budget: Any) -> Strategy:
     """The strategy that the arguments describe. Raises InputError with a sentence for each wrong argument."""
-    by_kind = {"solver": solver, "linear": linear, "refresh": refresh}
+    by_kind = {"solver": solver, "linear": linear, "refresh": refresh, "operator": operator}
     document = {name: {"kind": value} if isinstance(value, str) else value for name, value in by_kind.items()}
     if refresh is None:
         named = load_registry().class_of("solver", document["solver"])
@@ -162,7 +164,7 @@ def strategy_of(caller: str, solver: Any, linear: Any, refresh: Any, stop: Any, 
     except ValidationError as error:
         problems = problems_in(error, _model(), document)
     else:
-        strategy = Strategy(made.solver, made.linear, made.refresh, made.stop, made.budget)
+        strategy = Strategy(made.solver, made.linear, made.refresh, made.operator, made.stop, made.budget)
         problems = claims_missing(strategy.solver, strategy.stop)
         if not problems:
             return strategy

@@ -30,6 +30,7 @@ def solve(
     *,
     linear: Given = "superlu",
     refresh: Given | None = None,
+    operator: Given = "tangent",
     stop: Mapping[str, Any] | StoppingTest | None = None,
     budget: Mapping[str, Any] | Budget | None = None,
     pattern: Any | None = None,
@@ -40,8 +41,9 @@ def solve(
     problem : F, a function of arrays (U,) -> (U,), whose Jacobian comes from the formula itself; or a `System`, or a
         `NonlinearProblem`.
     start : u_0, (U,); may be left out for a `System`, which has its own.
-    solver, linear, refresh : by kind ("newton"), with parameters ({"kind": "anm", "order": 15}), or as instances;
-        without `refresh` the solver's default rule decides when K* is renewed.
+    solver, linear, refresh, operator : by kind ("newton"), with parameters ({"kind": "anm", "order": 15}), or as
+        instances; `operator` is what K* is made of; without `refresh` the solver's default rule decides when it is
+        renewed.
     stop, budget : stopping test and budget, such as {"tolerance": 1e-10} and {"iterations": 50}.
     pattern : for a function: sparse (U, U), with an entry wherever J(u) may differ from zero; J(u) then costs a few
         columns instead of U.
@@ -50,7 +52,7 @@ def solve(
     The `Outcome` says how the solve ended, a failure too. Raises InputError for arguments that cannot be used.
     """
     posed = posed_problem("nlsolve.solve", problem, start, pattern, jacobian)
-    return _solved(posed, strategy_of("nlsolve.solve", solver, linear, refresh, stop, budget)).outcome
+    return _solved(posed, strategy_of("nlsolve.solve", solver, linear, refresh, operator, stop, budget)).outcome
 
 
 def compare(
@@ -60,6 +62,7 @@ def compare(
     *,
     linear: Given = "superlu",
     refresh: Given | None = None,
+    operator: Given = "tangent",
     stop: Mapping[str, Any] | StoppingTest | None = None,
     budget: Mapping[str, Any] | Budget | None = None,
     pattern: Any | None = None,
@@ -79,7 +82,7 @@ def compare(
         raise mistake(caller, "solvers", solvers, 'should be a list or a dictionary of them, such as ["newton", "anm"]')
     named = solvers if isinstance(solvers, Mapping) else None
     chosen = [
-        strategy_of(caller, solver, linear, refresh, stop, budget)
+        strategy_of(caller, solver, linear, refresh, operator, stop, budget)
         for solver in (solvers if named is None else named.values())
     ]
     names = [_label(strategy.solver) for strategy in chosen] if named is None else list(named)

@@ -13,6 +13,7 @@ from nlsolve.contracts.status import SolveError, Status
 from nlsolve.series import Array, NoSeries
 from nlsolve.solving.counted_matrix import CountedMatrix, counted
 from nlsolve.solving.ledger import Ledger
+from nlsolve.solving.matrices import CheckedOperator
 
 
 class CountedExpansion(Expansion):
@@ -49,11 +50,14 @@ class CountedExpansion(Expansion):
 class CountedProblem(NonlinearProblem):
     """A problem whose residuals, Jacobians, products with them and series are entered in a ledger.
 
+    operator : what K* is made of; None: J(u).
+
     The driver judges the states of a method by `uncounted_residual` and `uncounted_scale`.
     """
 
-    def __init__(self, problem: NonlinearProblem, ledger: Ledger) -> None:
-        self._problem, self._ledger = problem, ledger
+    def __init__(self, problem: NonlinearProblem, ledger: Ledger, operator: CheckedOperator | None = None) -> None:
+        self._problem, self._ledger, self._operator = problem, ledger, operator
+        self.operator_is_jacobian = operator is None
         self._last: tuple[Array, Array] | None = None
         self._scales: dict[bytes, float] = {}
         self.is_gradient = problem.is_gradient
@@ -77,6 +81,22 @@ class CountedProblem(NonlinearProblem):
     def secant(self, u: Array) -> CountedMatrix:
         """A(u), (U, U), counted as a Jacobian. Raises SolveError (not applicable) when the problem has none."""
         return self._assembled(self._problem.secant, u)
+
+    def operator(self, u: Array) -> CountedMatrix:
+        """The matrix that K* is made of at u, (U, U), counted as a Jacobian.
+
+        Raises SolveError when the problem or the operator has none, or one that cannot be used.
+        """
+        operator = self._operator
+        return self.jacobian(u) if operator is None else self._assembled(lambda u: operator.matrix(self._problem, u), u)
+
+    def newtonian(self, u: Array, rate: float | None) -> CountedMatrix:
+        """See `NonlinearProblem`; counted as a Jacobian."""
+        return self._assembled(lambda u: self._problem.newtonian(u, rate), u)
+
+    def jacobian_by(self, discretizer: Any, u: Array) -> CountedMatrix:
+        """See `NonlinearProblem`; counted as a Jacobian."""
+        return self._assembled(lambda u: self._problem.jacobian_by(discretizer, u), u)
 
     def _assembled(self, assemble: Callable[[Array], Any], u: Array) -> CountedMatrix:
         way_out = "define its method `jacobian`"

@@ -37,7 +37,8 @@ def solve(
     After every step the driver measures ‖R_new‖/‖R_old‖ for the table of steps and for the refresh rule of `tangent`.
     A SolveError of the method becomes the status of the outcome; any other error is raised.
     """
-    counted, begun, renewals = CountedProblem(problem, ledger), ledger.copy(), tangent.renewals
+    counted = CountedProblem(problem, ledger, tangent.operator)
+    begun, renewals, withheld = ledger.copy(), tangent.renewals, tangent.withheld
     scale = counted.uncounted_scale(start)
     before, rows = start, list[dict[str, Any]]()
     residual_norm = size = np.inf
@@ -47,6 +48,9 @@ def solve(
         blame: Mapping[str, float] = {}
         if status is not Status.CONVERGED and np.isfinite(before).all():
             blame = problem.blame(before, counted.uncounted_residual(before))
+        if status is not Status.CONVERGED and tangent.operator is not None and tangent.withheld > withheld:
+            name = tangent.operator.name
+            detail = f"{detail or status.sentence}; the refresh rule asked for a new K*, and {name} has no other"
         spent = ledger.since(begun)
         return Outcome(
             status,
@@ -65,6 +69,12 @@ def solve(
     if not np.isfinite(scale):
         return ended(
             Status.NON_FINITE, "the forces at the first state are not finite: the law gave no finite viscosity"
+        )
+    if tangent.operator is not None and not solver.uses_operator:
+        return ended(
+            Status.NOT_APPLICABLE,
+            f"{type(solver).__name__} factorises a matrix of its own, in which {tangent.operator.name} has no say: "
+            "leave `operator` at its default, or choose a method that keeps any K*, such as modified-newton",
         )
     iterator = iter(solver.steps(counted, tangent, start))
     first = best = np.inf

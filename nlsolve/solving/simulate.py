@@ -15,6 +15,7 @@ from nlsolve.contracts.linear_solver import LinearSolver
 from nlsolve.contracts.nonlinear_solver import NonlinearSolver
 from nlsolve.contracts.outcome import Outcome
 from nlsolve.contracts.problem import NonlinearProblem
+from nlsolve.contracts.rules.operator import IterationOperator
 from nlsolve.contracts.rules.refresh import RefreshRule
 from nlsolve.contracts.scene import Entry, Simulation, Solve
 from nlsolve.contracts.status import SolveError, Status
@@ -23,12 +24,13 @@ from nlsolve.results.frames import steps_frame
 from nlsolve.series import Array
 from nlsolve.solving.driver import solve
 from nlsolve.solving.ledger import Ledger
+from nlsolve.solving.matrices import checked
 from nlsolve.solving.stopping import Budget, StoppingTest
 from nlsolve.solving.tangent import Tangent
 
 
 class Method(Protocol):
-    """The components that every case has: linear solver, solver, refresh rule, stopping test and budget."""
+    """The components that every case has: linear solver, solver, refresh rule, operator, stopping test and budget."""
 
     @property
     def linear(self) -> LinearSolver: ...
@@ -36,6 +38,8 @@ class Method(Protocol):
     def solver(self) -> NonlinearSolver: ...
     @property
     def refresh(self) -> RefreshRule: ...
+    @property
+    def operator(self) -> IterationOperator: ...
     @property
     def stop(self) -> StoppingTest: ...
     @property
@@ -147,7 +151,8 @@ class _Run:
     ) -> None:
         self.method, self.listen, self.watch = method, listen, watch
         self.ledger, self.start_ledger = Ledger(clock), Ledger(clock)
-        self.tangent = Tangent(method.linear, method.refresh, self.ledger)
+        self.operator = checked(method.operator)
+        self.tangent = Tangent(method.linear, method.refresh, self.ledger, operator=self.operator)
         self.start_tangent = Tangent(method.linear, None, self.start_ledger)
         self.simulation = build(self.ledger.entry)
         self.rows: list[dict[str, Any]] = []
@@ -197,7 +202,8 @@ class _Run:
         """Solve a problem by the method of the case; its rows, counts and largest residual are kept."""
         method, k = self.method, task.increment
         if not self.tangent.renewals:  # reuses the ordering of the way to the first state
-            self.tangent = Tangent(method.linear, method.refresh, self.ledger, self.start_tangent.factors)
+            ordered = self.start_tangent.factors
+            self.tangent = Tangent(method.linear, method.refresh, self.ledger, ordered, self.operator)
         outcome = solve(task.problem, method.solver, self.tangent, task.start, method.stop, method.budget, self.ledger)
         self.iterations += outcome.iterations
         self.false_convergence += outcome.claimed_wrongly
@@ -226,6 +232,8 @@ class _Run:
     def keep(self, task: Solve, outcome: Outcome) -> Mapping[str, float]:
         """Keep a state that solves its problem; returns columns of `steps` for its last step."""
         self.kept = task.problem, outcome.state
+        if self.operator is not None:
+            self.operator.solved(task.problem, outcome.state)
         columns = self.simulation.keep(task, outcome.state)
         self.watch(self.simulation)
         return columns

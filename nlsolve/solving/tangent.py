@@ -15,6 +15,7 @@ from nlsolve.contracts.status import SolveError, Status
 from nlsolve.series import Array
 from nlsolve.solving.counted_matrix import CountedMatrix, counted, plain
 from nlsolve.solving.ledger import Ledger
+from nlsolve.solving.matrices import CheckedOperator
 
 SMALLEST = 1e-16  # a smaller contraction is rounding, and counts as this one
 RECENT = 10.0  # solves after which an earlier rate weighs 1/e
@@ -25,23 +26,34 @@ class Tangent(KeptTangent):
 
     rule : when K* is renewed; None: at every iteration.
     pattern : factors of a matrix with a similar pattern, whose ordering may be used again.
+    operator : what K* is made of, where that is not the tangent.
     renewals : how often K* has been renewed.
+    withheld : how often the rule has asked for a new K* when the operator had no other.
     """
 
     def __init__(
-        self, linear: LinearSolver, rule: RefreshRule | None, ledger: Ledger, pattern: Factors | None = None
+        self,
+        linear: LinearSolver,
+        rule: RefreshRule | None,
+        ledger: Ledger,
+        pattern: Factors | None = None,
+        operator: CheckedOperator | None = None,
     ) -> None:
         self._linear, self._rule, self._ledger, self._pattern = linear, rule, ledger, pattern
+        self.operator = operator
         self._matrix: CountedMatrix | None = None
         self.factors: Factors | None = None
         self.history = TangentHistory()
-        self.renewals = 0
+        self.renewals = self.withheld = 0
         self._accounted = 0  # solves whose digits are in the history
         self._told = False  # whether the method has reported a contraction since the last step, with this K*
 
     def refresh_if_due(self, assemble: Callable[[], Any]) -> bool:
         """See `KeptTangent`; the factorisation is entered in the ledger."""
         due = self.factors is None or self._rule is None or self._rule.due(self.history)
+        if due and self.factors is not None and self.operator is not None and not self.operator.renewable:
+            due = False
+            self.withheld += 1
         if due:
             self._matrix = counted(assemble(), self._ledger)
             self.factors = self._factorized(self._matrix)
@@ -51,8 +63,11 @@ class Tangent(KeptTangent):
         return due
 
     def _factorized(self, matrix: CountedMatrix) -> Factors:
-        with self._ledger.entry("factorization"):
-            factors = self._linear.factorize(plain(matrix), self.factors or self._pattern)
+        try:
+            with self._ledger.entry("factorization"):
+                factors = self._linear.factorize(plain(matrix), self.factors or self._pattern)
+        except SolveError as error:
+            raise self._blamed(error.status, error.detail) from error
         self._ledger.counts["factorization"] += factors.attempts - 1
         return factors
 
@@ -64,6 +79,9 @@ class Tangent(KeptTangent):
         """
         if self.factors is None or self._matrix is None:
             raise TypeError("there is no tangent yet: call refresh_if_due before solve")
+        if self.operator is not None and len(rhs) != self._matrix.shape[0]:
+            why = f"keeps a K* of {self._matrix.shape[0]} unknowns, and the problem has {len(rhs)} now"
+            raise self.operator.refusal(Status.NOT_APPLICABLE, why)
         if not np.isfinite(rhs).all():
             raise SolveError(Status.NON_FINITE, "a right-hand side for the tangent was not finite")
         x = self._solved(self.factors, rhs)
@@ -71,8 +89,14 @@ class Tangent(KeptTangent):
             x = x + self._solved(self.factors, rhs - self._matrix @ x)
         self.history = replace(self.history, solves=self.history.solves + 1)
         if not np.isfinite(x).all():
-            raise SolveError(Status.SINGULAR_TANGENT, "a solve with the tangent gave no finite answer")
+            raise self._blamed(Status.SINGULAR_TANGENT, "a solve with the tangent gave no finite answer")
         return x
+
+    def _blamed(self, status: Status, why: str) -> SolveError:
+        """The error, which names the operator where K* is not the tangent."""
+        if self.operator is None:
+            return SolveError(status, why)
+        return self.operator.refusal(status, f"gave a K* that cannot be used ({why or status.sentence})")
 
     def _solved(self, factors: Factors, rhs: Array) -> Array:
         """One `solve` of the factors. The solves and products that they report are counted, also when it fails."""

@@ -14,6 +14,7 @@ from pydantic_core import PydanticSerializationError, to_jsonable_python
 from nlsolve.contracts.component import Component
 from nlsolve.contracts.linear_solver import LinearSolver
 from nlsolve.contracts.nonlinear_solver import NonlinearSolver
+from nlsolve.contracts.rules.operator import IterationOperator
 from nlsolve.contracts.rules.refresh import RefreshRule
 from nlsolve.contracts.scene import Misfit, Scene, Section
 from nlsolve.registry.component_tables import ComponentTable, class_name
@@ -27,6 +28,7 @@ COMMON: Mapping[str, Section] = {
     "linear": Section(LinearSolver),
     "solver": Section(NonlinearSolver),
     "refresh": Section(RefreshRule, of="solver"),
+    "operator": Section(IterationOperator),
     "stop": Section(StoppingTest),
     "budget": Section(Budget),
 }

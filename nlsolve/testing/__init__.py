@@ -18,6 +18,7 @@ from nlsolve.testing.problems import check_problem
 from nlsolve.testing.rules import (
     check_globalization,
     check_homotopy_form,
+    check_operator,
     check_predictor,
     check_range_rule,
     check_refresh_rule,
@@ -31,6 +32,7 @@ __all__ = [
     "check_homotopy_form",
     "check_law",
     "check_linear_solver",
+    "check_operator",
     "check_predictor",
     "check_problem",
     "check_range_rule",

@@ -1,4 +1,4 @@
-"""Rules shared by every method: when K* is renewed, where an increment begins, how long a step may be."""
+"""Rules shared by every method: what K* is made of, when it is renewed, where an increment begins, step lengths."""
 
 from __future__ import annotations
 
@@ -8,6 +8,16 @@ from nlsolve.plugin import Component, hookimpl
 from nlsolve_rules.energy import Energy
 from nlsolve_rules.full_steps import FullSteps
 from nlsolve_rules.least_residual import Backtracking, Cubic, NonMonotone
+from nlsolve_rules.operators import (
+    Diagonal,
+    FirstTangent,
+    Mass,
+    Newtonian,
+    OtherDiscretization,
+    PreviousTangent,
+    Secant,
+    TangentHere,
+)
 from nlsolve_rules.predictors import Polynomial, Previous
 from nlsolve_rules.refresh import (
     AverageCost,
@@ -20,11 +30,21 @@ from nlsolve_rules.refresh import (
 )
 
 REFRESH_RULES = (EveryIteration, EveryM, PoorContraction, CostOptimal, AverageCost, RangeUnderOne, Never)
+OPERATORS = (
+    TangentHere,
+    PreviousTangent,
+    FirstTangent,
+    Secant,
+    Newtonian,
+    OtherDiscretization,
+    Diagonal,
+    Mass,
+)
 PREDICTORS = (Previous, Polynomial)
 GLOBALIZATIONS = (FullSteps, Backtracking, Cubic, NonMonotone, Energy)
 
 
 @hookimpl
 def nlsolve_components() -> Iterable[type[Component]]:
-    """The refresh rules, predictors and globalisations of this package."""
-    return (*REFRESH_RULES, *PREDICTORS, *GLOBALIZATIONS)
+    """The refresh rules, iteration operators, predictors and globalisations of this package."""
+    return (*REFRESH_RULES, *OPERATORS, *PREDICTORS, *GLOBALIZATIONS)

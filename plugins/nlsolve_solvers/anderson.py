@@ -24,10 +24,11 @@ class Anderson(NonlinearSolver):
         {"kind": "none"}, description="how far along the mixed step, 1 being all of it"
     )
     default_refresh: ClassVar = {"kind": "poor-contraction"}
+    uses_operator: ClassVar[bool] = True
 
     def matrix(self, problem: NonlinearProblem, state: np.ndarray) -> Any:
         """The matrix that is factorised into K*, (U, U)."""
-        return problem.jacobian(state)
+        return problem.operator(state)
 
     def steps(self, problem: NonlinearProblem, tangent: KeptTangent, start: np.ndarray) -> Iterator[Step]:
         """The iterates u_0, u_1, …"""

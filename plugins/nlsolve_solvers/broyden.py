@@ -29,6 +29,7 @@ class Broyden(NonlinearSolver):
         {"kind": "none"}, description="how the step length t is found"
     )
     default_refresh: ClassVar = {"kind": "poor-contraction"}
+    uses_operator: ClassVar[bool] = True
 
     def steps(self, problem: NonlinearProblem, tangent: KeptTangent, start: np.ndarray) -> Iterator[Step]:
         """The iterates u_0, u_1, …"""
@@ -36,7 +37,7 @@ class Broyden(NonlinearSolver):
         residual, search = problem.residual(state), self.globalization.search(problem)
         yield Step(state)
         while True:
-            if tangent.refresh_if_due(lambda: problem.jacobian(state)) or updates.count == self.memory:
+            if tangent.refresh_if_due(lambda: problem.operator(state)) or updates.count == self.memory:
                 updates = Updates()
             plain = -tangent.solve(residual)
             direction = updates.next(plain)

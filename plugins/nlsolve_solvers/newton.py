@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Literal
+from typing import ClassVar, Literal
 
 import numpy as np
 from pydantic import Field
@@ -18,6 +18,7 @@ class Newton(NonlinearSolver):
     globalization: Globalized = Field(  # type: ignore[assignment]
         {"kind": "backtracking"}, description="how the step length t is found"
     )
+    uses_operator: ClassVar[bool] = True
 
     def steps(self, problem: NonlinearProblem, tangent: KeptTangent, start: np.ndarray) -> Iterator[Step]:
         """The iterates u_0, u_1, …"""
@@ -32,7 +33,7 @@ class Newton(NonlinearSolver):
         state, residual = start, problem.residual(start)
         yield Step(state), residual
         while True:
-            tangent.refresh_if_due(lambda: problem.jacobian(state))
+            tangent.refresh_if_due(lambda: problem.operator(state))
             direction = -tangent.solve(residual)
             length, residual = search.length(problem, state, residual, direction)
             state = state + length * direction

@@ -21,6 +21,7 @@ class Picard(Anderson):
     depth: int = Field(0, ge=0, description="m, differences of past iterates that are mixed; 0: none")
     damping: float = Field(1.0, gt=0, lt=2, description="β, relaxation of the correction")
     default_refresh: ClassVar = {"kind": "every-iteration"}
+    uses_operator: ClassVar[bool] = False
 
     def matrix(self, problem: NonlinearProblem, state: np.ndarray) -> Any:
         """A(u)."""

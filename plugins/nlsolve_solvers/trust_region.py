@@ -22,6 +22,7 @@ class TrustRegion(NonlinearSolver):
 
     kind: Literal["trust-region"] = "trust-region"
     default_refresh: ClassVar = {"kind": "poor-contraction"}
+    uses_operator: ClassVar[bool] = True
 
     def steps(self, problem: NonlinearProblem, tangent: KeptTangent, start: np.ndarray) -> Iterator[Step]:
         """The iterates u_0, u_1, …; raises SolveError (stagnated) when no step in the smallest region lowers ‖R‖."""
@@ -29,7 +30,7 @@ class TrustRegion(NonlinearSolver):
         residual = problem.residual(state)
         yield Step(state)
         while True:
-            tangent.refresh_if_due(lambda: jacobian(state))
+            tangent.refresh_if_due(lambda: jacobian.operator(state))
             chord = -tangent.solve(residual)
             if float(np.linalg.norm(residual)) == 0.0:
                 yield Step(state)

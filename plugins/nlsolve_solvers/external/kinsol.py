@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 from pydantic import Field
@@ -50,6 +50,7 @@ class Kinsol(NonlinearSolver):
     depth: int = Field(5, ge=0, description="m, iterates mixed by picard and fixed-point")
     tolerance: float = Field(1e-8, gt=0, description="relative residual at which one run ends")
     iterations: int = Field(50, gt=0, description="of KINSOL in one run")
+    uses_operator: ClassVar[bool] = True
 
     def steps(self, problem: NonlinearProblem, tangent: KeptTangent, start: np.ndarray) -> Iterator[Step]:
         """The start, and the ends of the runs. Raises SolveError (not applicable) if sundials4py is not installed."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import atexit
 from collections.abc import Iterator
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -47,6 +47,7 @@ class PetscSnes(NonlinearSolver):
     depth: int = Field(5, gt=0, description="m, iterates remembered by anderson, ngmres and qn")
     tolerance: float = Field(1e-8, gt=0, description="relative residual at which one run ends")
     iterations: int = Field(50, gt=0, description="of SNES in one run")
+    uses_operator: ClassVar[bool] = True
 
     def steps(self, problem: NonlinearProblem, tangent: KeptTangent, start: np.ndarray) -> Iterator[Step]:
         """The start, and the ends of the runs. Raises SolveError (not applicable) if petsc4py is not installed."""

@@ -32,16 +32,22 @@ class ScipyRoot(NonlinearSolver):
     precondition: bool = Field(True, description="right preconditioning by K*")
     jacobian: Literal["differences", "products"] = Field("differences", description="how hybr comes by its matrix")
     default_refresh: ClassVar = {"kind": "poor-contraction"}
+    uses_operator: ClassVar[bool] = True
 
     def steps(self, problem: NonlinearProblem, tangent: KeptTangent, start: np.ndarray) -> Iterator[Step]:
         """The start, and the ends of the runs. Raises SolveError (stagnated) if a step or pivot of SciPy vanishes."""
         state, known = start, [problem.residual(start)]
         size = float(np.linalg.norm(known[0]))
         goal = self.tolerance * problem.scale(start)
+        if not (self.precondition or problem.operator_is_jacobian):
+            raise SolveError(
+                Status.NOT_APPLICABLE,
+                "without preconditioning there is no K*: set precondition = true, or leave `operator` at its default",
+            )
         yield Step(state)
         while True:
             if self.precondition:
-                tangent.refresh_if_due(lambda: problem.jacobian(state))
+                tangent.refresh_if_due(lambda: problem.operator(state))
             found, values = self._run(problem, tangent, state, known, min(goal, LEAST_GAIN * size))
             state = state + (tangent.solve(found.x) if self.precondition else found.x)
             to_the_end = self.method == "hybr" or goal <= LEAST_GAIN * size

@@ -73,7 +73,7 @@ class Served:
         self.observe(u)
         self._state = self._at_tangent = u.copy()
         self._solves = 0
-        self._tangent.refresh_if_due(lambda: self._jacobian(u))
+        self._tangent.refresh_if_due(lambda: self._jacobian.operator(u))
 
     def observe(self, u: np.ndarray) -> None:
         """Tell the refresh rule the contraction per solve with K*, from where K* was last asked for to u."""

@@ -93,6 +93,7 @@ class AsymptoticNumericalMethod(NonlinearSolver):
     corrections: int = Field(0, ge=0, description="Newton corrections with K* at the end of a path")
     default_refresh: ClassVar = {"kind": "range-under-one"}
     claims: ClassVar[bool] = True
+    uses_operator: ClassVar[bool] = True
 
     def steps(self, problem: NonlinearProblem, tangent: KeptTangent, start: np.ndarray) -> Iterator[Step]:
         """The start, the ends of the branches, and their corrections. Raises SolveError (range exhausted)."""
@@ -100,10 +101,10 @@ class AsymptoticNumericalMethod(NonlinearSolver):
         goal = None if self.residual is None else self.residual * problem.scale(start)
         yield Step(state)
         while True:
-            fresh = tangent.refresh_if_due(lambda: problem.jacobian(state))
+            fresh = tangent.refresh_if_due(lambda: problem.operator(state))
             branch, found, limit = self._branch(problem, tangent, state, goal)
             is_short = not (found.a_max >= 1.0 if self.short_range == "renew" else found.a_max > SHORTEST_RANGE)
-            if is_short and not fresh and tangent.refresh_if_due(lambda: problem.jacobian(state)):
+            if is_short and not fresh and tangent.refresh_if_due(lambda: problem.operator(state)):
                 branch, found, limit = self._branch(problem, tangent, state, goal)
             if not found.a_max > SHORTEST_RANGE:
                 raise self._exhausted(branch, found)

@@ -38,6 +38,7 @@ class NewtonKrylov(NonlinearSolver):
         {"kind": "backtracking"}, description="how the step length t is found"
     )
     default_refresh: ClassVar = {"kind": "poor-contraction"}
+    uses_operator: ClassVar[bool] = True
 
     def steps(self, problem: NonlinearProblem, tangent: KeptTangent, start: np.ndarray) -> Iterator[Step]:
         """The iterates u_0, u_1, …"""
@@ -48,7 +49,7 @@ class NewtonKrylov(NonlinearSolver):
         yield Step(state)
         while True:
             size = float(np.linalg.norm(residual))
-            tangent.refresh_if_due(lambda: jacobian(state))
+            tangent.refresh_if_due(lambda: jacobian.operator(state))
             if size == 0.0:
                 yield Step(state)
                 continue
