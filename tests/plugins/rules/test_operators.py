@@ -38,6 +38,7 @@ from nlsolve_solvers import (
 )
 from nlsolve_solvers.external import ScipyRoot
 from nlsolve_solvers.homotopy.branch import Branch
+from nlsolve_solvers.homotopy.forms import FixedPoint, NewtonForm
 from nlsolve_solvers.modified_newton import ModifiedNewton
 
 import nlsolve
@@ -169,10 +170,10 @@ def test_the_tangent_as_a_strangers_operator_changes_no_number(solver: Nonlinear
     assert books.counts["jacobian"] >= ledger.counts["jacobian"]
 
 
-@pytest.mark.parametrize("form", ["fixed-point", "newton"])
+@pytest.mark.parametrize("form", [FixedPoint(), NewtonForm()], ids=lambda form: form.kind)
 @pytest.mark.parametrize("operator", [Mass(scale=7.0), Mass(scale=30.0), Diagonal(scale=1.3), TangentHere()], ids=name)
 @pytest.mark.parametrize("p", [1, 2, 5, 12])
-def test_on_a_linear_problem_the_homotopy_is_richardsons_iteration(operator: IterationOperator, p: int, form: str):
+def test_on_a_linear_problem_the_homotopy_is_richardsons_iteration(operator: IterationOperator, p: int, form: HomotopyForm):
     """W(1) = W_1 + … + W_p is what p steps u ← u − K*⁻¹ R(u) add, whatever K* is."""
     ledger = Ledger()
     tangent = Tangent(DenseLU(), Never(), ledger, operator=checked(operator))
