@@ -45,7 +45,8 @@ class _Afresh(Assembly):
 
 
 class IterationOperator(Component, ABC):
-    """What K* is made of, for every method that iterates with a kept matrix.
+    """What K* is made of, for every method that iterates with a kept matrix. On the way to the first state, which is no
+    part of the march, K* is the tangent.
 
     class Scaled(IterationOperator):  # K* = 1.1 J(u)
         kind: Literal["scaled"] = "scaled"
