@@ -6,7 +6,7 @@ Runs STUDY (default: studies/paper/ageing.toml), whose K* is never renewed, or t
 folder RESULTS. In the first series of increment k, at age k of K*, a_max = η^(1/(p−1))/θ defines θ, the growth of the
 terms from order to order. K* has served as many increments as pass before the first with θ > η^(1/(p−1)), which is the
 first with a_max < 1. Prints θ of every order, then for each order and tolerance the life predicted by θ of the run with
-the highest order and the largest tolerance alone, the life in the case's own run, and the 2015 paper's table 1.
+the highest order and the largest tolerance alone, the life in a run of its own where the study has one, and the 2015 paper's table 1.
 """
 
 from __future__ import annotations
@@ -69,11 +69,12 @@ def report(theta: pd.DataFrame) -> str:
         "",
         f"{'p':>3s} {'η':>6s} {'η^(1/(p−1))':>12s} {'predicted':>10s} {'own run':>8s} {'paper':>6s} {'θ/age':>7s}",
     ]
-    for p, eta in theta:
+    for p, eta in sorted({*PAPER, *theta}):
         limit, paper = allowed(p, eta), PAPER.get((p, eta))
         published = f"{paper:6d} {limit / paper:7.4f}" if paper else ""
-        served = life(theta[teacher], p, eta), life(theta[p, eta].dropna(), p, eta)
-        lines.append(f"{p:3d} {eta:6.0e} {limit:12.4f} {served[0]:10.0f} {served[1]:8.0f} {published}")
+        predicted = life(theta[teacher], p, eta)
+        own = f"{life(theta[p, eta].dropna(), p, eta):8.0f}" if (p, eta) in theta else f"{'–':>8s}"
+        lines.append(f"{p:3d} {eta:6.0e} {limit:12.4f} {predicted:10.0f} {own} {published}")
     lines += ["", f"times {INCREMENT:g} s: the lives of table 1; θ/age: the paper's life and the θ it allows"]
     return "\n".join(lines)
 
