@@ -6,7 +6,8 @@ Runs STUDY (default: studies/paper/ageing.toml), whose K* is never renewed, or t
 folder RESULTS. In the first series of increment k, at age k of K*, a_max = η^(1/(p−1))/θ defines θ, the growth of the
 terms from order to order. K* has served as many increments as pass before the first with θ > η^(1/(p−1)), which is the
 first with a_max < 1. Prints θ of every order, then for each order and tolerance the life predicted by θ of the run with
-the highest order and the largest tolerance alone, the life in a run of its own where the study has one, and the 2015 paper's table 1.
+the highest order and the largest tolerance alone, the life in a run of its own where the study has one, and the 2015
+paper's table 1.
 """
 
 from __future__ import annotations
