@@ -48,6 +48,7 @@ from nlsolve.flow.momentum import Flow
 from nlsolve.plugin import (
     Component,
     Expansion,
+    HomotopyForm,
     IterationOperator,
     NodeMotion,
     NonlinearProblem,
@@ -173,7 +174,9 @@ def test_the_tangent_as_a_strangers_operator_changes_no_number(solver: Nonlinear
 @pytest.mark.parametrize("form", [FixedPoint(), NewtonForm()], ids=lambda form: form.kind)
 @pytest.mark.parametrize("operator", [Mass(scale=7.0), Mass(scale=30.0), Diagonal(scale=1.3), TangentHere()], ids=name)
 @pytest.mark.parametrize("p", [1, 2, 5, 12])
-def test_on_a_linear_problem_the_homotopy_is_richardsons_iteration(operator: IterationOperator, p: int, form: HomotopyForm):
+def test_on_a_linear_problem_the_homotopy_is_richardsons_iteration(
+    operator: IterationOperator, p: int, form: HomotopyForm
+):
     """W(1) = W_1 + … + W_p is what p steps u ← u − K*⁻¹ R(u) add, whatever K* is."""
     ledger = Ledger()
     tangent = Tangent(DenseLU(), Never(), ledger, operator=checked(operator))

@@ -15,6 +15,7 @@ from nlsolve_laws import PowerLaw
 from nlsolve_scenes import StirringTool
 from nlsolve_scenes.nodes.rings import Rings
 from nlsolve_solvers.homotopy.branch import Branch
+from nlsolve_solvers.homotopy.forms import FixedPoint
 
 from nlsolve.flow.momentum import Flow, Inertia, node_major
 from nlsolve.series import Array, Series
@@ -176,7 +177,7 @@ def test_the_expansion_of_a_flow_is_the_papers(index: float) -> None:
 def test_the_branch_of_the_homotopy_is_the_papers(index: float) -> None:
     scene = increment(index)
     terms = ByHand(scene).terms(ORDER)
-    branch = Branch(scene.flow, scene.start, "fixed-point", "series")
+    branch = Branch(scene.flow, scene.start, FixedPoint(), "series")
     for _ in range(ORDER):
         rhs = branch.recurrence.right_hand_side()
         branch.append(rhs, scene.aged.solve(rhs))
