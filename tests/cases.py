@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from nlsolve_discretizers import MovingLeastSquares
-from nlsolve_laws import PowerLaw
+from nlsolve_laws import Bingham, CarreauYasuda, Cross, HerschelBulkley, NortonHoff, PowerLaw, SellarsTegart
 from nlsolve_linear.superlu import SuperLU
 from nlsolve_rules.operators import TangentHere
 from nlsolve_rules.predictors import Previous
@@ -40,6 +40,18 @@ from nlsolve.solving.ledger import Ledger
 from nlsolve.solving.stopping import Budget, StoppingTest
 from nlsolve.solving.tangent import Tangent
 
+LAWS: dict[str, ConstitutiveLaw] = {
+    law.kind_name(): law
+    for law in (
+        PowerLaw(),
+        NortonHoff(),
+        CarreauYasuda(),
+        Cross(),
+        HerschelBulkley(),
+        Bingham(),
+        SellarsTegart(),
+    )
+}
 PLAIN = SuperLU(ordering="mmd-ata")  # no trials of orderings in the counts
 
 

@@ -6,8 +6,8 @@ from typing import Any, Literal
 
 import numpy as np
 import pytest
-from cases import setup
-from nlsolve_laws import Bingham, CarreauYasuda, Cross, HerschelBulkley, NortonHoff, PowerLaw, SellarsTegart
+from cases import LAWS, setup
+from nlsolve_laws import Bingham, HerschelBulkley, PowerLaw
 from nlsolve_linear.superlu import SuperLU
 from nlsolve_scenes import Couette, StirringTool
 from nlsolve_scenes.nodes.rings import GradedRings, Rings
@@ -20,19 +20,6 @@ from nlsolve.plugin import ConstitutiveLaw, Exact, FlowScene
 from nlsolve.series import Array
 from nlsolve.solving.simulate import run_case as march
 from nlsolve.testing import check_scene
-
-LAWS: dict[str, ConstitutiveLaw] = {
-    law.kind_name(): law
-    for law in (
-        PowerLaw(),
-        NortonHoff(),
-        CarreauYasuda(),
-        Cross(),
-        HerschelBulkley(),
-        Bingham(),
-        SellarsTegart(),
-    )
-}
 
 
 def exact_of(scene: FlowScene, law: ConstitutiveLaw, radii: Array) -> Exact:

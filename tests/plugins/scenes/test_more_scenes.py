@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from cases import setup
-from nlsolve_laws import Bingham, CarreauYasuda, Cross, HerschelBulkley, NortonHoff, PowerLaw, SellarsTegart
+from cases import LAWS, setup
+from nlsolve_laws import Bingham, NortonHoff, PowerLaw
 from nlsolve_linear.superlu import SuperLU
 from nlsolve_scenes import Cavity, EccentricCylinders, Manufactured
 from nlsolve_scenes.formulas import FUNCTIONS, Jet, formula
@@ -25,18 +25,6 @@ from nlsolve.study.study import Study
 from nlsolve.testing import check_scene
 
 VISCOUS = NortonHoff(consistency=1.0, index=1.0)  # μ = 1 MPa s
-LAWS: dict[str, ConstitutiveLaw] = {
-    law.kind_name(): law
-    for law in (
-        PowerLaw(),
-        NortonHoff(),
-        CarreauYasuda(),
-        Cross(),
-        HerschelBulkley(),
-        Bingham(),
-        SellarsTegart(),
-    )
-}
 SCENES: list[FlowScene] = [
     EccentricCylinders(),
     EccentricCylinders(eccentricity=0.01),
