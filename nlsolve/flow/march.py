@@ -17,7 +17,7 @@ from nlsolve.flow.continuation import REST, Solves, Stage, walk
 from nlsolve.flow.incompressibility import iterate_pressure
 from nlsolve.flow.momentum import Flow
 from nlsolve.flow.moving_nodes import Markers
-from nlsolve.flow.observables import divergence, nodal_fields, velocity_error, wall_reaction
+from nlsolve.flow.observables import divergence, nodal_fields, rate_drift, velocity_error, wall_reaction
 from nlsolve.flow.state import FlowParts, FlowState
 from nlsolve.flow.validity import audit
 from nlsolve.series import Array
@@ -58,16 +58,19 @@ class FlowSimulation(Simulation):
         return outcome
 
     def keep(self, solve: Solve, state: Array) -> Mapping[str, float]:
-        """Keep a solved state (2F,); returns place and velocity of the probe, when there is one."""
+        """Keep a solved state (2F,); returns the drift of accumulated strain rates, and place and velocity of the
+        probe, when there are such."""
         assert isinstance(solve.problem, Flow)
         self.state.keep(solve.problem, state)
         if solve.preparation is not None:
             return {}
         self.reached = solve.time
+        measures = {"rate_drift": rate_drift(solve.problem, state)} if self.parts.motion.accumulates else {}
         if self.probe is None:
-            return {}
+            return measures
         place, velocity = self.state.cloud.nodes[self.probe], self.state.velocity[self.probe]
-        return {f"probe_{name}": float(value) for name, value in zip("xyuv", (*place, *velocity), strict=True)}
+        probed = {f"probe_{name}": float(value) for name, value in zip("xyuv", (*place, *velocity), strict=True)}
+        return measures | probed
 
     # The parts of a march.
 
@@ -186,6 +189,8 @@ class FlowSimulation(Simulation):
             return found
         flow, velocity, time = state.flow, state.flow.velocity(state.unknowns), self.reached
         change = None if self.before is None else (velocity - self.before) / parts.time.increment
+        if parts.motion.accumulates:
+            found["rate_drift"] = rate_drift(flow, state.unknowns)
         found["divergence"] = divergence(flow, velocity)
         found |= velocity_error(parts.scene, flow, velocity, time)
         found |= wall_reaction(parts.scene, parts.motion, parts.discretizer, flow, velocity, time)

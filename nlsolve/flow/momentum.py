@@ -19,6 +19,7 @@ from nlsolve.contracts.continuum.discretizer import Discretizer, Operators
 from nlsolve.contracts.continuum.law import ConstitutiveLaw, Number, rate_squared, stress, tangent_moduli
 from nlsolve.contracts.problem import Expansion, NonlinearProblem
 from nlsolve.contracts.status import SolveError, Status
+from nlsolve.flow.point_rates import PointRates
 from nlsolve.series import Array, Series
 
 
@@ -49,6 +50,7 @@ class Flow(NonlinearProblem):
     pressure : p at the volume points, shape (L,) [MPa], for the iterated penalty.
     inertia, convection, body_force : present when given; f at the interior nodes, shape (F, 2) [N/mm³].
     reference_rate : ε̄ [1/s] at which a Newtonian operator takes the viscosity when none is given.
+    drift : ε̇ − B v and tr ε̇ − B_θ v [1/s] where strain rates are accumulated; absent: ε̇ = B v.
     """
 
     def __init__(
@@ -63,6 +65,7 @@ class Flow(NonlinearProblem):
         convection: Convection | None = None,
         body_force: Array | None = None,
         reference_rate: float | None = None,
+        drift: PointRates | None = None,
     ) -> None:
         self.cloud, self.operators, self.law = cloud, operators, law
         self._terms = inertia, convection
@@ -74,6 +77,9 @@ class Flow(NonlinearProblem):
         self._lifted = lifted
         self._strain = operators.strain.rate[:, self._free]
         self._strain_boundary = operators.strain.rate @ lifted
+        self.drift = drift
+        if drift is not None:
+            self._strain_boundary = self._strain_boundary + drift.strain.ravel()
         self._force = operators.strain.force
         self._gradient: Any = None
         self._dilatation: Any = None
@@ -91,6 +97,8 @@ class Flow(NonlinearProblem):
             self._gradient = -volumetric.force @ sp.diags_array(self._modulus)
             self._dilatation = volumetric.rate[:, self._free]
             constant += self._gradient @ (volumetric.rate @ lifted)
+            if drift is not None and drift.dilatation is not None:
+                constant += self._gradient @ drift.dilatation
             if pressure is not None:
                 constant += volumetric.force @ pressure
         if inertia is not None:
@@ -112,7 +120,7 @@ class Flow(NonlinearProblem):
         return Expansion(path, self._balance(path))
 
     def _balance(self, u: Number) -> Number:
-        balance = self._constant - self._force @ stress(self.law, self._strain_rate(u)).reshape(-1)
+        balance = self._constant - self._force @ stress(self.law, self.strain_rate(u)).reshape(-1)
         if self._gradient is not None:
             balance = balance + self._gradient @ (self._dilatation @ u)
         if self._inertia is not None:
@@ -121,18 +129,19 @@ class Flow(NonlinearProblem):
             balance = balance + self._carried.force(u)
         return balance
 
-    def _strain_rate(self, u: Number) -> Number:
+    def strain_rate(self, u: Number) -> Number:
+        """ε̇ at the strain points, (3, M) ordered xx, yy, xy [1/s]."""
         return (self._strain @ u + self._strain_boundary).reshape(3, -1)
 
     def jacobian(self, u: Array) -> Any:
         """J = W ρ (1/Δt + ∂(v·∇ v)/∂v) − S C B − S_θ λ B_θ with the pointwise moduli C (3, 3, M) of the law."""
         carried = None if self._carried is None else self._carried.tangent(u)
-        return self._linearized(tangent_moduli(self.law, self._strain_rate(u)), carried)
+        return self._linearized(tangent_moduli(self.law, self.strain_rate(u)), carried)
 
     def secant(self, u: Array) -> Any:
         """A = W ρ (1/Δt + v·∇) − S 2μ B − S_θ λ B_θ, viscosity and carrying velocity those of u (Picard, Oseen)."""
         carried = None if self._carried is None else self._carried.secant(u)
-        return self._linearized(secant_moduli(self.law, self._strain_rate(u)), carried)
+        return self._linearized(secant_moduli(self.law, self.strain_rate(u)), carried)
 
     def newtonian(self, u: Array, rate: float | None) -> Any:
         """A with one viscosity μ(rate²) at all points: the operator of a Newtonian material (Oseen's, when carried)."""
@@ -182,7 +191,7 @@ class Flow(NonlinearProblem):
 
     def scale(self, u: Array) -> float:
         """‖|S| |s| + |S_θ λ| |B_θ v| + W ρ |v/Δt + v·∇ v| + |constant|‖₂: the size of the forces that cancel in R."""
-        terms = abs(self._force) @ np.abs(stress(self.law, self._strain_rate(u))).ravel() + np.abs(self._constant)
+        terms = abs(self._force) @ np.abs(stress(self.law, self.strain_rate(u))).ravel() + np.abs(self._constant)
         if self._gradient is not None:
             terms += abs(self._gradient) @ np.abs(self._dilatation @ u)
         if self._inertia is not None:
@@ -197,7 +206,7 @@ class Flow(NonlinearProblem):
         """
         forces = np.nan_to_num(np.linalg.norm(residual.reshape(-1, 2), axis=1), nan=np.inf)
         node = int(self.cloud.interior[forces.argmax()])
-        rate = np.sqrt(rate_squared(self._strain_rate(u)))
+        rate = np.sqrt(rate_squared(self.strain_rate(u)))
         nearest = np.linalg.norm(self.operators.strain.points - self.cloud.nodes[node], axis=1).argmin()
         floor = self.law.regularization_rate or 0.0
         return {
@@ -217,9 +226,13 @@ class Flow(NonlinearProblem):
         """u, shape (2F,), from the velocities (N, 2) of all nodes."""
         return velocity[self.cloud.interior].ravel()
 
+    def rates(self, u: Array) -> PointRates:
+        """ε̇ at the strain points and tr ε̇ at the volume points."""
+        return PointRates(self.strain_rate(u), self.dilatation_rate(u))
+
     def stress_at_points(self, u: Array) -> Array:
         """s at the evaluation points, shape (3, M) [MPa]."""
-        return stress(self.law, self._strain_rate(u))
+        return stress(self.law, self.strain_rate(u))
 
     def dilatation_rate(self, u: Array) -> Array | None:
         """tr ε̇ = div v at the volume points, shape (L,) [1/s]; None without a volumetric term."""
@@ -227,6 +240,8 @@ class Flow(NonlinearProblem):
         if self._modulus is None or volumetric is None:
             return None
         rate: Array = volumetric.rate @ self.velocity(u).ravel()
+        if self.drift is not None and self.drift.dilatation is not None:
+            rate = rate + self.drift.dilatation
         return rate
 
     def pressure(self, u: Array) -> Array | None:

@@ -54,8 +54,17 @@ def divergence(flow: Flow, velocity: Array) -> float:
     dilatation = flow.dilatation_rate(flow.unknowns(velocity))
     if dilatation is None:
         return float("nan")
-    squared = rate_squared(flow.operators.strain_rate(velocity))
+    squared = rate_squared(flow.strain_rate(flow.unknowns(velocity)))
     return float(np.sqrt(np.mean(dilatation**2) / np.mean(squared)))
+
+
+def rate_drift(flow: Flow, u: Array) -> float:
+    """‖ε̇ − B v‖/‖ε̇‖, root mean squares over the strain points: how far accumulated strain rates are from those of the
+    velocity; 0 when they are the same.
+    """
+    if flow.drift is None:
+        return 0.0
+    return float(np.sqrt(np.mean(rate_squared(flow.drift.strain)) / np.mean(rate_squared(flow.strain_rate(u)))))
 
 
 def wall_reaction(
@@ -124,7 +133,7 @@ def nodal_fields(
 ) -> pd.DataFrame:
     """One row for each node: place at t = 0 and now, velocity, strain rates, exact velocity (columns of `FIELDS`)."""
     nodes = flow.cloud.nodes
-    strain_rate = flow.operators.strain_rate(velocity)
+    strain_rate = flow.strain_rate(flow.unknowns(velocity))
     to_nodes = discretizer.values(flow.operators.strain.points, nodes)
     exx, eyy, exy = at_nodes = np.stack([to_nodes @ component for component in strain_rate])
     exact = scene.exact(flow.law, nodes, time)

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from nlsolve.contracts.continuum.cloud import Cloud
-from nlsolve.contracts.continuum.discretizer import Discretizer, Operators
+from nlsolve.contracts.continuum.discretizer import Discretizer, Operators, PointOperators
 from nlsolve.contracts.continuum.geometry import Geometry
 from nlsolve.contracts.continuum.law import ConstitutiveLaw, rate_squared
 from nlsolve.contracts.continuum.terms import NodeMotion, Physics, Recording, TimeSteps
@@ -19,6 +19,7 @@ from nlsolve.flow.continuation import Start
 from nlsolve.flow.momentum import Convection, Flow, Inertia
 from nlsolve.flow.moving_nodes import MovingNodes
 from nlsolve.flow.observables import discretization_error
+from nlsolve.flow.point_rates import Passage, PointRates
 from nlsolve.series import Array
 from nlsolve.solving.stopping import Budget
 
@@ -49,6 +50,7 @@ class FlowState:
     pressure : p at the volume points, shape (L,) [MPa]; None until it has been iterated.
     velocity : of all nodes, solved last, shape (N, 2) [mm/s].
     guess : velocity of all nodes that the next solve begins with, shape (N, 2) [mm/s].
+    drift : how far accumulated strain rates are from those of `velocity`; None as long as they are the same.
     flow, unknowns : the problem solved last, and its solution, shape (2F,). Before the first solve `flow` is None and
         `unknowns` is not set.
     """
@@ -62,6 +64,7 @@ class FlowState:
         self.moving: MovingNodes | None = None
         self.cloud: Cloud
         self.operators: Operators
+        self.drift: PointRates | None = None
         self.flow: Flow | None = None
         self.unknowns: Array
 
@@ -85,11 +88,28 @@ class FlowState:
         self.time = time
         if self.moving is None:
             return None
+        earlier, operators, searches = self.cloud, self.operators, self.moving.searches
         self.cloud, carry = self.moving.move(self.cloud, self.velocity, before, time)
         self.build_operators()
         if carry is not None:
             self.velocity = self.velocity + carry @ self.velocity
+        if self.parts.motion.accumulates and self.flow is not None:
+            rates = self.flow.rates(self.unknowns)
+            passage = self._passage(earlier, operators, self.operators, kept=self.moving.searches == searches)
+            self.drift = rates.at(*passage) - PointRates.of(self.operators, self.velocity)
         return carry
+
+    def _passage(
+        self, earlier: Cloud, here: Operators, there: Operators, kept: bool = False
+    ) -> tuple[Passage, Passage | None]:
+        """From the strain and volume points `here`, of an earlier cloud, to those `there`, of the present one."""
+
+        def between(here: PointOperators, there: PointOperators) -> Passage:
+            return Passage(here, there, earlier, self.cloud, self.parts.discretizer, kept)
+
+        volumetric = here.volumetric, there.volumetric
+        dilatation = None if volumetric[0] is None or volumetric[1] is None else between(volumetric[0], volumetric[1])
+        return between(here.strain, there.strain), dilatation
 
     def build_operators(self) -> None:
         """Build the operators of the present nodes; the pressure is interpolated to the new volume points."""
@@ -143,7 +163,14 @@ class FlowState:
             Convection(physics.density, self.gradient) if self.gradient is not None else None,
             None if body_force is None else load * body_force,
             self.scene.reference_rate,
+            self.drift_at(operators),
         )
+
+    def drift_at(self, operators: Operators) -> PointRates | None:
+        """The drift at the points of the present cloud's operators, which may be another discretizer's."""
+        if self.drift is None or operators is self.operators:
+            return self.drift
+        return self.drift.at(*self._passage(self.cloud, self.operators, operators))
 
     def rate_squared_at_volume_points(self, operators: Operators) -> Array:
         """ε̄² of the velocity so far, taken at the strain point nearest to each volume point, shape (L,)."""

@@ -95,7 +95,7 @@ def audit(
         error = estimate()
     except SolveError as refusal:
         return {"doubt": f"the audits could not be made: {refusal.detail}"}
-    strain_rate = flow.operators.strain_rate(velocity)
+    strain_rate = flow.strain_rate(flow.unknowns(velocity))
     slopes = np.stack([derivative @ velocity for derivative in gradient])  # (2, N, 2): ∂/∂x and ∂/∂y of u, v
     stress_slopes = _stress_slopes(flow, strain_rate, gradient, to_nodes)
     found = {

@@ -61,6 +61,9 @@ RUNS = _by_name(
         "cloud_quality",
         "moving nodes: least distance of a node to its nearest over that distance at t = 0, over the march",
     ),
+    Column(
+        "rate_drift", "accumulated strain rates: ‖ε̇ − B v‖/‖ε̇‖ at the end, their distance from those of the velocity"
+    ),
     Column("increments", "time steps completed; 1 for a steady state"),
     Column("time", "time reached", "s", "$t$"),
     Column("iterations", "iterations or series used by the method in all increments"),
@@ -260,6 +263,7 @@ STEPS = _by_name(
     ),
     *REPORTED.values(),
     Column("seconds", "time inside the method so far in the march", "s", "time inside the method"),
+    Column("rate_drift", "accumulated strain rates, on accepted steps: ‖ε̇ − B v‖/‖ε̇‖"),
     Column("probe_x", "x of the probe node, on accepted steps", "mm", "$x$"),
     Column("probe_y", "y of the probe node, on accepted steps", "mm", "$y$"),
     Column("probe_u", "x velocity of the probe node, on accepted steps", "mm/s", "$u$"),

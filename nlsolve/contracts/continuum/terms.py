@@ -93,6 +93,11 @@ class NodeMotion(Component):
         description="moving nodes: neighbours and triangles are kept until the distance of two near nodes has changed "
         "by this part of the nearest one's; 0: found anew in each increment",
     )
+    rates: Literal["of-velocity", "accumulated"] = Field(
+        "of-velocity",
+        description="moving nodes: strain rates are those of the velocity at the present nodes, or carried with the "
+        "material, to which each increment adds that of its velocity",
+    )
 
     @model_validator(mode="after")
     def _fits_together(self) -> Self:
@@ -107,7 +112,18 @@ class NodeMotion(Component):
                 f"skin = {self.skin:g}: the neighbours of fixed nodes never change; "
                 'use nodes = "lagrangian" or leave it out'
             )
+        if self.accumulates and not self.moving:
+            raise ValueError(
+                'rates = "accumulated": at fixed nodes they are those of the velocity; use nodes = "lagrangian"'
+            )
+        if self.accumulates and self.shifting:
+            raise ValueError('rates = "accumulated": shifted nodes are not material points; leave shifting out')
         return self
+
+    @property
+    def accumulates(self) -> bool:
+        """Whether strain rates are carried with the material."""
+        return self.rates == "accumulated"
 
     @property
     def moving(self) -> bool:
