@@ -15,6 +15,7 @@ from matplotlib.axes import Axes
 from matplotlib.colors import BoundaryNorm
 from matplotlib.figure import Figure
 from matplotlib.text import Text
+from matplotlib.tri import TriContourSet
 from pydantic import TypeAdapter, ValidationError
 
 from nlsolve.results.columns import FIELDS
@@ -282,6 +283,30 @@ def test_field_limit_window_and_logarithm(frames: dict[str, pd.DataFrame]) -> No
     assert decades.axes[1].get_ylim() == (-4, 3)
     assert decades.axes[1].get_yticklabels()[-1].get_text() == "$10^{3}$"
     assert not isinstance(decades.axes[0].collections[0].norm, BoundaryNorm)
+
+
+def test_an_overlay_draws_the_second_case_over_the_first(frames: dict[str, pd.DataFrame]) -> None:
+    """The second field is half of the first: its contour lines end at the half of the largest level."""
+    two: dict[str, Any] = {"where": {"solver.order": 20}, "group": "solver.tolerance", "overlay": True}
+    fields = frames["fields"].copy()
+    fields.loc[fields["case"] == "c", ["u", "x"]] *= [0.5, 1.0]
+    figure = picture(frames | {"fields": fields}, kind="field", value="u", **two)
+    axes, _ = figure.axes
+    assert legend(figure) == ["tolerance $10^{-6}$", "tolerance $10^{-8}$"]
+    filled, lines = [drawn for drawn in axes.collections if isinstance(drawn, TriContourSet)]
+    assert filled.filled
+    assert not lines.filled
+    reached = [level for level, path in zip(lines.levels, lines.get_paths(), strict=True) if len(path)]
+    largest = snapshot("b", 0.6)["u"].abs().max()
+    assert max(map(abs, reached)) <= 0.5 * largest < max(map(abs, lines.levels))
+    cloud = picture(frames, kind="cloud", **two)
+    assert len(cloud.axes) == 1
+    assert legend(cloud) == ["$y_0 > 0$", r"$y_0 \leq 0$", "boundary", "tolerance $10^{-8}$"]
+    assert len(cloud.axes[0].lines[-1].get_xdata()) == len(snapshot("c", 0.6))  # type: ignore[arg-type]
+    with pytest.raises(FigureError, match=r"overlay = true: the case 'newton \(diverged\)' left no nodes"):
+        picture(
+            frames, kind="field", value="u", overlay=True, group=["solver.kind", "solver.order", "solver.tolerance"]
+        )
 
 
 def test_small_multiples_share_colours_and_show_who_is_missing(frames: dict[str, pd.DataFrame]) -> None:

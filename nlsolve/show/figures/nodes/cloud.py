@@ -14,11 +14,12 @@ from scipy.spatial import cKDTree
 
 from nlsolve.results.frames import Frames
 from nlsolve.series import Array
-from nlsolve.show.figures.nodes.panels import PanelsFigure, panels_of, snapshots_of
+from nlsolve.show.figures.nodes.panels import PanelsFigure, layer_names, panels_of, snapshots_of
 from nlsolve.show.figures.nodes.sections import boundaries
-from nlsolve.show.figures.style import ACCENT, COLOURS
+from nlsolve.show.figures.style import ACCENT, COLOURS, legend_outside
 
 HALVES = (("$y_0 > 0$", COLOURS[0]), (r"$y_0 \leq 0$", COLOURS[4]))
+OVER: Any = {"linestyle": "none", "marker": "o", "fillstyle": "none", "color": "black", "markeredgewidth": 0.3}
 RING: Any = {"markerfacecolor": "none", "markeredgecolor": ACCENT, "markeredgewidth": 1.2}
 
 
@@ -33,15 +34,20 @@ class CloudFigure(PanelsFigure):
 
     def paint(self, figure: Figure, frames: Frames) -> None:
         snapshots = snapshots_of(self, frames, ("x", "y", "x0", "y0"))
-        for axes, snapshot in panels_of(figure, self, snapshots, bar=False):
+        apart, over = self.layers(snapshots)
+        for axes, snapshot in panels_of(figure, self, apart, bar=False):
             self._nodes(axes, snapshot.rows)
+            for layer in over:
+                places = _material(layer.rows)[["x", "y"]].to_numpy(float)
+                axes.plot(*places.T, markersize=2.0 * _marker_size(axes, places), **OVER)
         dot: Any = {"linestyle": "none", "marker": "o"}
         handles = [Line2D([], [], color=colour, markeredgewidth=0, label=label, **dot) for label, colour in HALVES]
         handles.append(Line2D([], [], color="white", markeredgecolor="black", label="boundary", **dot))
+        handles += [Line2D([], [], label=name, **OVER) for name in layer_names(apart[0], over)]
         if self.probe is not None:
             handles.append(Line2D([], [], markersize=6, label="probe", **dot, **RING))
-        off_the_title: Any = "outside lower center" if figure.get_suptitle() else "outside upper center"
-        figure.legend(handles=handles, loc=off_the_title, ncols=len(handles), handlelength=1)
+        off_the_title = "lower" if figure.get_suptitle() else "upper"
+        legend_outside(figure, handles, [str(handle.get_label()) for handle in handles], off_the_title)
 
     def _nodes(self, axes: Axes, rows: pd.DataFrame) -> None:
         nodes, rows = rows[["x", "y"]].to_numpy(float), _material(rows)

@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
 from matplotlib.ticker import FixedLocator, FuncFormatter, MaxNLocator
+from matplotlib.tri import Triangulation
 from pydantic import Field
 
 from nlsolve.results.frames import Frames
 from nlsolve.series import Array
-from nlsolve.show.figures.nodes.panels import PanelsFigure, panels_of, snapshots_of
+from nlsolve.show.figures.nodes.panels import PanelsFigure, Snapshot, layer_names, panels_of, snapshots_of
 from nlsolve.show.figures.nodes.sections import outline, triangulate
-from nlsolve.show.figures.style import axis_label
+from nlsolve.show.figures.style import DASHES, axis_label, legend_outside
 
 SIGNED_MAP, POSITIVE_MAP = "RdBu_r", "viridis"
 LEVELS = 20
@@ -36,19 +39,20 @@ class FieldFigure(PanelsFigure):
             raise self.refuse(f"value = {self.value!r} has a sign, so log = true cannot show it; only 'rate' can")
         snapshots = snapshots_of(self, frames, ("x", "y", self.value))
         levels, extend = self._levels(np.concatenate([s.rows[self.value].to_numpy(float) for s in snapshots]))
-        panels = panels_of(figure, self, snapshots, bar=True)
+        apart, over = self.layers(snapshots)
+        panels = panels_of(figure, self, apart, bar=True)
+        outlines: Any = [{"color": "black", "linewidth": 0.5, "linestyle": DASHES[k % 4]} for k in range(len(over))]
         contours = None
         for axes, snapshot in panels:
-            value = snapshot.rows[self.value].to_numpy(float)
-            triangles = triangulate(snapshot.rows, value)
-            shown = np.where(np.isfinite(value), value, levels[0])
-            if self.log:
-                shown = np.log10(np.maximum(shown, FLOOR * np.nanmax(value)))
+            triangles, shown = self._shown(snapshot, levels[0])
             colours = POSITIVE_MAP if self.value == "rate" else SIGNED_MAP
             contours = axes.tricontourf(triangles, shown, levels=levels, cmap=colours, extend=extend)
             contours.set_edgecolor("face")  # hides the seams that PDF viewers draw between bands
             contours.set_linewidth(0.2)
             axes.add_collection(LineCollection(list(outline(triangles)), colors="0.25", linewidths=0.5))
+            for layer, line in zip(over, outlines, strict=True):
+                every = {"colors": line["color"], "linewidths": line["linewidth"], "linestyles": line["linestyle"]}
+                axes.tricontour(*self._shown(layer, levels[0]), levels=levels[:: LEVELS // 5], **every)
         assert contours is not None
         bar = figure.colorbar(contours, ax=figure.axes, fraction=0.05, pad=0.02, aspect=25)
         bar.set_label(axis_label([self.value], "fields"))
@@ -59,6 +63,17 @@ class FieldFigure(PanelsFigure):
         if self.log:
             bar.formatter = FuncFormatter(lambda power, _: f"$10^{{{power:.0f}}}$")
         bar.update_ticks()
+        if over:
+            handles = [Patch(color="0.8"), *(Line2D([], [], **line) for line in outlines)]
+            legend_outside(figure, handles, [apart[0].label, *layer_names(apart[0], over)], "lower")
+
+    def _shown(self, snapshot: Snapshot, lowest: float) -> tuple[Triangulation, Array]:
+        """The triangles of a cloud, and the value at its nodes, `lowest` where there is none."""
+        value = snapshot.rows[self.value].to_numpy(float)
+        shown = np.where(np.isfinite(value), value, lowest)
+        if self.log:
+            shown = np.log10(np.maximum(shown, FLOOR * np.nanmax(value)))
+        return triangulate(snapshot.rows, value), shown
 
     def _levels(self, values: Array) -> tuple[Array, Literal["neither", "both", "min", "max"]]:
         largest = float(np.nanmax(np.abs(values)))

@@ -26,12 +26,6 @@ class NodesFigure(BaseFigure):
     time: float | None = Field(None, ge=0, description="the nearest recorded time is drawn [s]; absent: the last")
 
 
-class PanelsFigure(NodesFigure):
-    """Base of figures with a panel a case, in which places of the plane are shown."""
-
-    window: Window | None = Field(None, description="xmin, xmax, ymin, ymax shown [mm]")
-
-
 @dataclass(frozen=True)
 class Snapshot:
     """The nodes of one case at one recorded time; no rows when the case left none."""
@@ -43,6 +37,30 @@ class Snapshot:
     @property
     def heading(self) -> str:
         return bracketed(self.label, self.note)
+
+
+class PanelsFigure(NodesFigure):
+    """Base of figures with a panel a case, in which places of the plane are shown."""
+
+    window: Window | None = Field(None, description="xmin, xmax, ymin, ymax shown [mm]")
+    overlay: bool = Field(False, description="one panel: the first case in colours, the others as outlines over it")
+
+    def layers(self, snapshots: Sequence[Snapshot]) -> tuple[Sequence[Snapshot], Sequence[Snapshot]]:
+        """The snapshots that have panels, and those drawn over the first of them, none unless `overlay` asks for it.
+
+        Raises FigureError when a layer has no nodes.
+        """
+        if not self.overlay:
+            return snapshots, ()
+        for snapshot in snapshots:
+            if snapshot.rows.empty:
+                raise self.refuse(f"overlay = true: the case {snapshot.heading!r} left no nodes to draw over others")
+        return snapshots[:1], snapshots[1:]
+
+
+def layer_names(first: Snapshot, over: Sequence[Snapshot]) -> list[str]:
+    """What a legend calls the layers over the first; a note that its title has is not repeated."""
+    return [layer.label if layer.note == first.note else layer.heading for layer in over]
 
 
 Panel = tuple[Axes, Snapshot]
