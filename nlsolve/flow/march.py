@@ -16,7 +16,7 @@ from nlsolve.contracts.status import SolveError, Status
 from nlsolve.flow.continuation import REST, Solves, Stage, walk
 from nlsolve.flow.incompressibility import iterate_pressure
 from nlsolve.flow.momentum import Flow
-from nlsolve.flow.moving_nodes import Markers
+from nlsolve.flow.motion.markers import Markers
 from nlsolve.flow.observables import divergence, nodal_fields, rate_drift, velocity_error, wall_reaction
 from nlsolve.flow.state import FlowParts, FlowState
 from nlsolve.flow.validity import audit

@@ -19,7 +19,7 @@ from nlsolve.contracts.continuum.discretizer import Discretizer, Operators
 from nlsolve.contracts.continuum.law import ConstitutiveLaw, Number, rate_squared, stress, tangent_moduli
 from nlsolve.contracts.problem import Expansion, NonlinearProblem
 from nlsolve.contracts.status import SolveError, Status
-from nlsolve.flow.point_rates import PointRates
+from nlsolve.flow.motion.point_rates import PointRates
 from nlsolve.series import Array, Series
 
 

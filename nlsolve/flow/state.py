@@ -17,9 +17,9 @@ from nlsolve.contracts.rules.predictor import Predictor
 from nlsolve.contracts.scene import Entry
 from nlsolve.flow.continuation import Start
 from nlsolve.flow.momentum import Convection, Flow, Inertia
-from nlsolve.flow.moving_nodes import MovingNodes
+from nlsolve.flow.motion.moving_nodes import MovingNodes
+from nlsolve.flow.motion.point_rates import Passage, PointRates
 from nlsolve.flow.observables import discretization_error
-from nlsolve.flow.point_rates import Passage, PointRates
 from nlsolve.series import Array
 from nlsolve.solving.stopping import Budget
 

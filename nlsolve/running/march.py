@@ -17,7 +17,7 @@ from nlsolve.contracts.scene import Simulation
 from nlsolve.contracts.status import InputError
 from nlsolve.flow.march import FlowSimulation
 from nlsolve.flow.momentum import Flow
-from nlsolve.flow.moving_nodes import LOST, within
+from nlsolve.flow.motion.markers import LOST, within
 from nlsolve.flow.observables import nodal_fields
 from nlsolve.flow.state import FlowParts
 from nlsolve.registry.problems import StudyError

@@ -20,8 +20,8 @@ from pydantic import ValidationError
 
 from nlsolve.flow.continuation import Start
 from nlsolve.flow.momentum import Flow
+from nlsolve.flow.motion.point_rates import Passage, PointRates
 from nlsolve.flow.observables import rate_drift
-from nlsolve.flow.point_rates import Passage, PointRates
 from nlsolve.plugin import Cloud, NodeMotion, Operators, Physics, TimeSteps
 from nlsolve.solving.simulate import Record, run_case
 from nlsolve.solving.stopping import StoppingTest

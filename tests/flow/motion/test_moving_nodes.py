@@ -15,7 +15,8 @@ from pydantic import ValidationError
 from scipy.integrate import solve_ivp
 
 from nlsolve import SolveError, Status
-from nlsolve.flow.moving_nodes import LARGEST_SHIFT, Markers, MovingNodes, halfway, runge_kutta, shifts
+from nlsolve.flow.motion.markers import Markers, halfway, runge_kutta
+from nlsolve.flow.motion.moving_nodes import LARGEST_SHIFT, MovingNodes, shifts
 from nlsolve.plugin import Cloud, NodeMotion, Recording, TimeSteps
 from nlsolve.show.figures import draw
 from nlsolve.show.figures.nodes.cloud import CloudFigure

@@ -18,7 +18,7 @@ from nlsolve_scenes.nodes.rings import Rings
 from nlsolve_solvers.modified_newton import ModifiedNewton
 from pydantic import ValidationError
 
-from nlsolve.flow.moving_nodes import MovingNodes, Neighbourhoods
+from nlsolve.flow.motion.moving_nodes import MovingNodes, Neighbourhoods
 from nlsolve.plugin import Cloud, Discretizer, NodeMotion, Operators, Physics, TimeSteps
 from nlsolve.solving.simulate import run_case as march
 from nlsolve.solving.stopping import StoppingTest
