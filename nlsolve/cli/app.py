@@ -32,7 +32,10 @@ from nlsolve.results.frames import json_rows
 from nlsolve.running.diagnose import diagnose as diagnostics_of
 from nlsolve.running.forecast import ASSUMPTION, forecast
 from nlsolve.running.runner import run as run_study
-from nlsolve.running.store import StoreError, read_tables
+from nlsolve.running.store import StoreError
+from nlsolve.running.store.parts import Parts
+from nlsolve.running.store.reading import read_tables
+from nlsolve.running.store.standing import KEPT, standings_of
 from nlsolve.show.tables import build
 from nlsolve.study.case import section_rows
 from nlsolve.study.study import Study
@@ -57,7 +60,13 @@ Settings = Annotated[
     list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="set a parameter, such as solver.order=20")
 ]
 Quick = Annotated[bool, typer.Option("--quick", help="the shrunk study of the file's [quick] section")]
+Out = Annotated[Path | None, typer.Option(help="results folder; default: results/NAME or results/NAME-quick")]
 Json = Annotated[bool, typer.Option("--json", help="machine-readable output")]
+
+
+def default_folder(study: Path, quick: bool) -> Path:
+    """The results folder of a study where none is named."""
+    return Path("results") / (study.stem + ("-quick" if quick else ""))
 
 
 @app.callback()
@@ -79,15 +88,13 @@ def show_version(asked: bool) -> None:
 @app.command()
 def run(
     study: StudyFile,
-    out: Annotated[
-        Path | None, typer.Option(help="results folder; default: results/NAME or results/NAME-quick")
-    ] = None,
+    out: Out = None,
     settings: Settings = None,
     quick: Quick = False,
     as_json: Json = False,
 ) -> None:
     """Run a study, or the part of it that is not yet in the results folder."""
-    folder = out or Path("results") / (study.stem + ("-quick" if quick else ""))
+    folder = out or default_folder(study, quick)
     console = Console(stderr=True)
     with ending(folder):
         checked = Study.from_toml(study, parse_assignments(settings or []), quick)
@@ -118,18 +125,26 @@ def validate(study: StudyFile, settings: Settings = None, as_json: Json = False)
 
 
 @app.command()
-def plan(study: StudyFile, settings: Settings = None, quick: Quick = False, as_json: Json = False) -> None:
-    """List the cases of a study and forecast what they cost."""
+def plan(
+    study: StudyFile, out: Out = None, settings: Settings = None, quick: Quick = False, as_json: Json = False
+) -> None:
+    """List the cases of a study, which of them are to be run and why, and forecast what they cost."""
+    folder = out or default_folder(study, quick)
     with ending():
         checked = Study.from_toml(study, parse_assignments(settings or []), quick)
+        words = standings_of(Parts(folder), checked)
         frame = forecast(checked)
+    frame.insert(1, "plan", frame["case"].map(words))
     if as_json:
-        typer.echo(json.dumps({"assumption": ASSUMPTION, "cases": json_rows(frame)}))
+        typer.echo(json.dumps({"assumption": ASSUMPTION, "folder": str(folder), "cases": json_rows(frame)}))
         return
     swept = list(dict.fromkeys(name for case in checked.cases for name in case.swept))
     sizes = ["increments", "nodes", "unknowns", "seconds_factorization", "seconds_start", "seconds", "seconds_all"]
-    print_frame(count(len(frame)), frame[["case", *swept, *sizes]])
-    typer.echo(f"{frame['seconds_all'].sum() * checked.timing.rounds:.3g} s in all ({ASSUMPTION})")
+    print_frame(count(len(frame)), frame[["case", "plan", *swept, *sizes]])
+    left = frame[frame["plan"] != KEPT]
+    told = ", ".join(f"{number} {word}" for word, number in frame["plan"].value_counts().items())
+    typer.echo(f"{told} (results in {folder})")
+    typer.echo(f"{left['seconds_all'].sum() * checked.timing.rounds:.3g} s to run {count(len(left))} ({ASSUMPTION})")
 
 
 @app.command()
@@ -162,11 +177,13 @@ def table(
 ) -> None:
     """Print the declared tables of a results folder."""
     with ending():
-        specs, runs = read_tables(folder)
-        names = [spec.name for spec in specs]
+        described, runs = read_tables(folder)
+        names = [spec.name for spec in described.tables]
         if name is not None and name not in names:
             raise StudyError(f"{folder}: there is no table {name!r}; {did_you_mean(name, names)}")
-        tables = [build(spec, runs) for spec in specs if name in (None, spec.name)]
+        tables = [build(spec, runs) for spec in described.tables if name in (None, spec.name)]
+    if len(runs) < len(described.cases):
+        say(f"{folder}: {len(runs)} of {count(len(described.cases))} are finished")
     if as_json:
         typer.echo(json.dumps({table.spec.name: table.long() for table in tables}))
         return

@@ -94,6 +94,7 @@ RUNS = _by_name(
     ),
     Column("rounds", "how often the case was timed; the seconds are those of its fastest round"),
     Column("clock", "clock of the seconds: wall, or processor, which does not count the time given to other programs"),
+    Column("environment", "where the case was computed: a name in the folder `environments` and in the report"),
     Column("unit.residual", "measured on the last problem of the case: seconds of one residual", "s"),
     Column("unit.expansion", "as unit.residual: beginning a series", "s"),
     Column("unit.jacobian", "as unit.residual: one Jacobian", "s"),

@@ -14,11 +14,12 @@ from threadpoolctl import threadpool_limits
 from nlsolve.contracts.linear_solver import LinearSolver
 from nlsolve.contracts.status import SolveError, Status
 from nlsolve.registry.problems import StudyError, did_you_mean
-from nlsolve.results.costs.cost_prediction import UNITS, with_predictions
+from nlsolve.results.costs.cost_prediction import UNITS
 from nlsolve.results.frames import Frames
-from nlsolve.results.reference_error import with_reference_errors
-from nlsolve.results.verdicts import number
-from nlsolve.running.store import Part, Store, merge
+from nlsolve.running.store import Part, Store, merge, rounds_of
+from nlsolve.running.store.environment import environment_here, name_of
+from nlsolve.running.store.reading import completed, environments_of
+from nlsolve.running.store.turns import SECONDS_BETWEEN_LOOKS, Turns
 from nlsolve.running.timing import CLOCKS, measure
 from nlsolve.show.figures import FigureError, draw, save
 from nlsolve.show.report import write_report
@@ -104,25 +105,30 @@ def run(
     study = study_of(study, overrides, quick)
     store = None if out is None else Store(Path(out), study)
     tell = listen or (lambda event: None)
-    parts = _finished(study, store)
-    turns = [(turn, case) for turn in range(1, study.timing.rounds + 1) for case in study.cases]
+    turns = Turns(study, store)
+    parts = turns.parts
     written = time.monotonic()
     try:
-        for position, (turn, case) in enumerate(turns, 1):
-            begun = Event(case, position, len(turns))
-            resumed = case.id in parts and _rounds(parts[case.id], study.timing) >= turn
+        while turns.left:
+            turn = turns.take()
+            if turn is None:
+                time.sleep(SECONDS_BETWEEN_LOOKS)
+                continue
+            case, resumed = turn.case, turns.is_done(turn)
             if not resumed:
-                tell(begun)
-                again = execute(case, position, len(turns), tell, study.timing)
+                tell(Event(case, turn.number, turn.cases))
+                again = execute(case, turn.number, turn.cases, tell, study.timing)
                 parts[case.id] = _fastest(parts.get(case.id), again, study.timing)
                 if store is not None:
-                    store.save(parts[case.id])
+                    store.save(case, parts[case.id])
+                    store.end(case)
                     if time.monotonic() - written > SECONDS_BETWEEN_FRAMES:
                         store.write_frames(_merged(study, parts))
                         written = time.monotonic()
-            tell(Event(case, position, len(turns), run=parts[case.id].run, resumed=resumed))
+            tell(Event(case, turn.number, turn.cases, run=parts[case.id].run, resumed=resumed))
     finally:
         if store is not None:
+            store.close()
             store.write_frames(_merged(study, parts))
     frames = _merged(study, parts)
     if store is None:
@@ -132,6 +138,8 @@ def run(
 
 def execute(case: Case, number: int, cases: int, tell: Listener, timing: Timing) -> Part:
     """Run one case. Every exception becomes a row that says so; an interruption (KeyboardInterrupt) is passed on."""
+    with threadpool_limits(limits=1):
+        environment = environment_here()
     try:
         with threadpool_limits(limits=1):
             clock = CLOCKS[timing.clock]
@@ -147,8 +155,8 @@ def execute(case: Case, number: int, cases: int, tell: Listener, timing: Timing)
     else:
         timed = {"rounds": 1, "seconds_most": record.summary.get("seconds"), "clock": timing.clock}
         summary, steps, fields = {**record.summary, **timed, **units}, record.steps, record.fields
-    row = {"case": case.id, **summary, **case.parameters}
-    return Part(row, _of_case(case.id, steps), _of_case(case.id, fields))
+    row = {"case": case.id, **summary, "environment": name_of(environment), **case.parameters}
+    return Part(row, _of_case(case.id, steps), _of_case(case.id, fields), environment)
 
 
 def unit_costs(record: Record, linear: LinearSolver, clock: Callable[[], float]) -> dict[str, float]:
@@ -162,19 +170,13 @@ def unit_costs(record: Record, linear: LinearSolver, clock: Callable[[], float])
         return nothing
 
 
-def _rounds(part: Part, timing: Timing) -> int:
-    """Number of rounds in which a case has been timed as the study asks; 0 for a case that crashed."""
-    known, units = number(part.run.get("rounds")), UNITS[0] in part.run or not timing.calibrate
-    return int(known) if known > 0 and units and part.run.get("clock") == timing.clock else 0
-
-
 def _fastest(before: Part | None, again: Part, timing: Timing) -> Part:
     """The fastest timing round of a case. Its row also has the slowest round's seconds and the number of rounds."""
-    if before is None or not _rounds(before, timing) or not _rounds(again, timing):
+    if before is None or not rounds_of(before.run, timing) or not rounds_of(again.run, timing):
         return again
     best = min(before, again, key=lambda part: part.run["seconds"])
     most = max(part.run["seconds_most"] for part in (before, again))
-    rounds = _rounds(before, timing) + 1
+    rounds = rounds_of(before.run, timing) + 1
     return replace(best, run={**best.run, "seconds_most": most, "rounds": rounds})
 
 
@@ -192,18 +194,10 @@ def study_of(study: Study | str | Path | Mapping[str, Any], overrides: Mapping[s
     return Study.from_toml(study, overrides, quick)
 
 
-def _finished(study: Study, store: Store | None) -> dict[str, Part]:
-    if store is None:
-        return {}
-    loaded = {case.id: store.load(case.id) for case in study.cases}
-    return {case: part for case, part in loaded.items() if part is not None}
-
-
 def _merged(study: Study, parts: Mapping[str, Part]) -> Frames:
     frames = merge([parts[case.id] for case in study.cases if case.id in parts])
     references = {case.id: case.reference for case in study.cases if case.reference}
-    frames = with_reference_errors(frames, references)
-    return replace(frames, runs=with_predictions(frames.runs))
+    return completed(frames, references)
 
 
 def _of_case(case: str, frame: pd.DataFrame) -> pd.DataFrame:
@@ -239,5 +233,6 @@ def _show(store: Store, study: Study, frames: Frames) -> tuple[str, ...]:
             except FigureError as error:
                 notes.append(str(error))
         captions = [(spec.name, spec.caption) for spec in study.figures]
-        write_report(store.folder, study.question, shown, captions, frames.runs)
+        environments = environments_of(store.parts, frames.runs)
+        write_report(store.folder, study.question, shown, captions, frames.runs, environments)
     return tuple(notes)

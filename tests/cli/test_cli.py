@@ -133,12 +133,11 @@ def test_invalid_input_is_2_in_one_sentence(tmp_path, arguments, sentence):
     assert result.stdout == ""
 
 
-def test_results_of_another_study_are_2(tmp_path):
+def test_a_folder_takes_the_study_with_other_settings(tmp_path):
     path = write_study(tmp_path)
     assert nlsolve("run", path).exit_code == 0
-    result = nlsolve("run", path, "--set", "law.index=0.3")
-    assert result.exit_code == 2
-    assert "holds results of another study" in result.stderr
+    assert nlsolve("run", path, "--set", "law.index=0.3").exit_code == 0
+    assert nlsolve("run", path).stderr.count("converged before") == 4
 
 
 def test_table(tmp_path):
@@ -176,6 +175,28 @@ def test_plan(tmp_path):
     assert first["seconds_all"] == pytest.approx(
         first["seconds_start"] + first["seconds"] + first["seconds_operators"]  # fixed nodes have one cloud
     )
+
+
+def test_plan_says_what_is_run_and_why(tmp_path, monkeypatch):
+    path = write_study(tmp_path)
+    assert "4 new (results in results/study)" in nlsolve("plan", path).stdout
+    assert not (tmp_path / "results").exists()
+    nlsolve("run", path, "--out", "o", "--set", 'sweep=[{grid={"solver.order"=[10],"solver.tolerance"=[1e-6]}}]')
+    told = nlsolve("plan", path, "--out", "o")
+    assert "3 new, 1 kept (results in o)" in told.stdout
+    assert "s to run 3 cases (forecast" in told.stdout
+    document = json.loads(nlsolve("plan", path, "--out", "o", "--json").stdout)
+    assert document["folder"] == "o"
+    assert [row["plan"] for row in document["cases"]] == ["kept", "new", "new", "new"]
+
+
+def test_table_says_how_much_of_the_plan_is_finished(tmp_path):
+    path = write_study(tmp_path)
+    nlsolve("run", path, "--out", "o")
+    assert nlsolve("table", "o").stderr == ""
+    for part in list((tmp_path / "o" / "cases").glob("*.json"))[:3]:
+        part.unlink()
+    assert nlsolve("table", "o").stderr == "o: 1 of 4 cases are finished\n"
 
 
 def test_plugins_and_why_one_failed(monkeypatch):

@@ -1,0 +1,99 @@
+"""A results folder: all cases that were ever finished in it, and the tables, frames and report of one study.
+
+A folder remembers its cases by what determines their numbers (`nlsolve.running.store.identity`), so that a study which
+grows or changes finds there whatever still applies.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Collection, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from nlsolve.contracts.status import Status
+from nlsolve.results.frames import Frames, Part
+from nlsolve.running.store.claims import Claims
+from nlsolve.running.store.identity import Identity, identity_of
+from nlsolve.running.store.parts import (
+    CASES,
+    Parts,
+    StoreError,
+    merge,
+    write_frame,
+    write_text,
+    writing,
+)
+from nlsolve.running.store.reading import STUDY, describe, names_in, something_else
+from nlsolve.running.store.standing import TRIED_AGAIN, Standings, rounds_of
+from nlsolve.study.case import Case
+from nlsolve.study.study import Study
+
+__all__ = ["TRIED_AGAIN", "Part", "Store", "StoreError", "merge", "rounds_of"]
+
+
+class Store:
+    """The results folder of a study that is run. Raises StoreError when it cannot be used or written."""
+
+    def __init__(self, folder: Path, study: Study, retried: Collection[Status] = TRIED_AGAIN) -> None:
+        self.folder, self.study = folder, study
+        self.parts = Parts(folder)
+        self.parts.refuse_old()
+        with self.writing():
+            if something_else(folder):
+                raise StoreError(f"{folder}: not a results folder: its {STUDY} was written by something else")
+            (folder / CASES).mkdir(parents=True, exist_ok=True)
+        self._claims = Claims(folder)
+        self._standings = Standings(self.parts, study.timing, retried)
+        self._begun: dict[str, Identity] = {case.id: identity_of(case) for case in study.cases}
+        self.write_text(STUDY, json.dumps(describe(study, self._begun), ensure_ascii=False) + "\n")
+
+    def load(self, case: Case) -> Part | None:
+        """The part of a finished case, under this study's names of settings.
+
+        None when there is none, it is damaged, something it depends on has changed, or the case is to be tried again.
+        """
+        standing = self._standings.of(case)
+        self._begun[case.id] = standing.identity
+        if standing.entry is None:
+            return None
+        frames = self.parts.frames(standing.entry)
+        if frames is None:
+            return None
+        return Part(standing.entry.run(names_in(case)), *frames)
+
+    def begin(self, case: Case) -> bool:
+        """Claim a case, so that no other run computes it; False while another run has it."""
+        with self.writing():
+            return self._claims.take(identity_of(case).key)
+
+    def save(self, case: Case, part: Part) -> None:
+        """Keep a part. It is not kept when a file that the case reads has changed since the case was looked up."""
+        identity = identity_of(case)
+        if identity == self._begun[case.id]:
+            self.parts.save(identity, part, case.parameters)
+
+    def end(self, case: Case) -> None:
+        """Give up the claim on a case."""
+        self._claims.release(self._begun[case.id].key)
+
+    def close(self) -> None:
+        """Give up all claims."""
+        self._claims.release_all()
+
+    def write_frames(self, frames: Frames) -> None:
+        """Write runs and steps as parquet and CSV, fields as parquet."""
+        for name, frame in (("runs", frames.runs), ("steps", frames.steps)):
+            write_frame(self.folder, self.folder / f"{name}.parquet", frame)
+            self.write_text(f"{name}.csv", frame.to_csv(index=False))
+        write_frame(self.folder, self.folder / "fields.parquet", frames.fields)
+
+    def write_text(self, name: str, text: str) -> None:
+        """Write a text file whole or not at all."""
+        write_text(self.folder, self.folder / name, text)
+
+    @contextmanager
+    def writing(self) -> Iterator[None]:
+        """Turn a failure of the file system into a StoreError."""
+        with writing(self.folder):
+            yield

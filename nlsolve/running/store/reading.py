@@ -1,0 +1,133 @@
+"""A results folder read without running anything: the study it was last used for, and whatever is finished of it."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+from pydantic import ValidationError
+
+from nlsolve.results.costs.cost_prediction import with_predictions
+from nlsolve.results.frames import Frames, Part
+from nlsolve.results.parameters import names_settings
+from nlsolve.results.reference_error import with_reference_errors
+from nlsolve.running.store.identity import Identity, case_of
+from nlsolve.running.store.parts import CASES, Parts, StoreError, merge
+from nlsolve.show.tables import TableSpec
+from nlsolve.study.case import Case
+from nlsolve.study.study import Study
+
+STUDY = "study.json"
+"""Name of the file that describes the study which a folder was last used for."""
+
+
+@dataclass(frozen=True)
+class Planned:
+    """A case of a plan: the name of its part, the names of its settings, and its reference case."""
+
+    key: str
+    names: Mapping[str, str]
+    reference: str
+
+
+@dataclass(frozen=True)
+class Description:
+    """The study which a folder was last used for."""
+
+    name: str
+    question: str
+    cases: tuple[Planned, ...]
+    tables: tuple[TableSpec, ...]
+
+
+def describe(study: Study, identities: Mapping[str, Identity]) -> dict[str, Any]:
+    """A study as its folder describes it, in JSON values."""
+    return {
+        "name": study.name,
+        "question": study.question,
+        "cases": [
+            {
+                "key": identities[case.id].key,
+                "names": names_in(case),
+                "reference": case.reference,
+            }
+            for case in study.cases
+        ],
+        "tables": [table.model_dump(mode="json") for table in study.tables],
+    }
+
+
+def names_in(case: Case) -> dict[str, str]:
+    """The names of a case's settings, by the column that holds them."""
+    return {name: word for name, word in case.parameters.items() if names_settings(name)}
+
+
+def description_of(folder: Path) -> Description | None:
+    """The study which a folder was last used for; None when its description is missing or damaged."""
+    try:
+        document = json.loads((folder / STUDY).read_text(encoding="utf-8"))
+        cases = tuple(Planned(**case) for case in document["cases"])
+        tables = tuple(TableSpec.model_validate(table) for table in document["tables"])
+        return Description(document["name"], document["question"], cases, tables)
+    except (OSError, ValueError, TypeError, KeyError, ValidationError):
+        return None
+
+
+def something_else(folder: Path) -> bool:
+    """Whether a folder without parts has a description that another program must have written."""
+    try:
+        return not (folder / CASES).exists() and not isinstance(json.loads((folder / STUDY).read_text("utf-8")), dict)
+    except ValueError:
+        return True
+    except OSError:
+        return False
+
+
+def completed(frames: Frames, references: Mapping[str, str]) -> Frames:
+    """Frames with the columns of `runs` that compare cases: distance from the reference, predicted seconds."""
+    frames = with_reference_errors(frames, references)
+    return replace(frames, runs=with_predictions(frames.runs))
+
+
+def finished(folder: Path, cases: tuple[Planned, ...], with_frames: bool = True) -> Frames:
+    """The frames of those cases that are finished; of `runs` alone unless other frames are asked for or needed."""
+    parts = Parts(folder)
+    references = {case_of(case.key): case.reference for case in cases if case.reference}
+    found = []
+    for case in cases:
+        entry = parts.entry(case.key)
+        if entry is None:
+            continue
+        frames = parts.frames(entry) if with_frames or references else (pd.DataFrame(), pd.DataFrame())
+        if frames is not None:
+            found.append(Part(entry.run(case.names), *frames))
+    return completed(merge(found), references)
+
+
+def environments_of(parts: Parts, runs: pd.DataFrame) -> dict[str, Mapping[str, str]]:
+    """Name -> environment of every environment in which rows of `runs` were computed."""
+    return {str(name): parts.environment(str(name)) for name in runs["environment"].dropna().unique()}
+
+
+def read_tables(folder: Path) -> tuple[Description, pd.DataFrame]:
+    """The study which a folder was last used for, and the runs of it that are finished.
+
+    Raises StoreError if there is no such study, or nothing of it is finished.
+    """
+    Parts(folder).refuse_old()
+    described = description_of(folder)
+    if described is None and (folder / CASES).is_dir():
+        raise StoreError(
+            f"{folder}: its {STUDY} cannot be read, which has the tables; no case is lost: run the study again with "
+            f"--out {folder}"
+        )
+    if described is None:
+        raise StoreError(f"{folder}: not a results folder: it has no readable {STUDY}")
+    runs = finished(folder, described.cases, with_frames=False).runs
+    if not len(runs):
+        raise StoreError(f"{folder}: no finished cases can be read there: run the study again with --out {folder}")
+    return described, runs
