@@ -1,20 +1,19 @@
-"""The commands of the command line: run, validate, plan, diagnose, plugins, table."""
+"""The commands on studies: run, validate, plan, diagnose; and the list of plugins."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import asdict
-from enum import IntEnum
 from importlib.metadata import version
-from pathlib import Path
 from typing import Annotated
 
 import typer
 from pydantic_core import to_jsonable_python
 from rich.console import Console
 
+from nlsolve.cli.endings import ExitCode, ending
+from nlsolve.cli.folders import folders
+from nlsolve.cli.options import Json, Out, Quick, Settings, StudyFile, default_folder
 from nlsolve.cli.printing import (
     count,
     left_out,
@@ -23,50 +22,22 @@ from nlsolve.cli.printing import (
     print_results,
     say,
     say_endings,
-    stdout,
 )
 from nlsolve.cli.progress import Watch
-from nlsolve.registry.problems import StudyError, did_you_mean
 from nlsolve.registry.registry import load_registry
 from nlsolve.results.frames import json_rows
 from nlsolve.running.diagnose import diagnose as diagnostics_of
 from nlsolve.running.forecast import ASSUMPTION, forecast
 from nlsolve.running.runner import run as run_study
-from nlsolve.running.store import StoreError
 from nlsolve.running.store.parts import Parts
-from nlsolve.running.store.reading import read_tables
 from nlsolve.running.store.standing import KEPT, standings_of
-from nlsolve.show.tables import build
 from nlsolve.study.case import section_rows
 from nlsolve.study.study import Study
 from nlsolve.study.sweeps import parse_assignments
 
-
-class ExitCode(IntEnum):
-    """The exit codes of the commands."""
-
-    COMPLETE = 0
-    CRASHED = 1
-    INVALID = 2
-    INTERRUPTED = 130
-
-
 app = typer.Typer(
     help="Compare nonlinear solution strategies on equal terms.", no_args_is_help=True, pretty_exceptions_enable=False
 )
-
-StudyFile = Annotated[Path, typer.Argument(metavar="STUDY", help="a study file (TOML)")]
-Settings = Annotated[
-    list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="set a parameter, such as solver.order=20")
-]
-Quick = Annotated[bool, typer.Option("--quick", help="the shrunk study of the file's [quick] section")]
-Out = Annotated[Path | None, typer.Option(help="results folder; default: results/NAME or results/NAME-quick")]
-Json = Annotated[bool, typer.Option("--json", help="machine-readable output")]
-
-
-def default_folder(study: Path, quick: bool) -> Path:
-    """The results folder of a study where none is named."""
-    return Path("results") / (study.stem + ("-quick" if quick else ""))
 
 
 @app.callback()
@@ -169,38 +140,4 @@ def plugins(as_json: Json = False) -> None:
     print_plugins(rows)
 
 
-@app.command()
-def table(
-    folder: Annotated[Path, typer.Argument(metavar="DIR", help="a results folder")],
-    name: Annotated[str | None, typer.Argument(help="one declared table; default: all")] = None,
-    as_json: Json = False,
-) -> None:
-    """Print the declared tables of a results folder."""
-    with ending():
-        described, runs = read_tables(folder)
-        names = [spec.name for spec in described.tables]
-        if name is not None and name not in names:
-            raise StudyError(f"{folder}: there is no table {name!r}; {did_you_mean(name, names)}")
-        tables = [build(spec, runs) for spec in described.tables if name in (None, spec.name)]
-    if len(runs) < len(described.cases):
-        say(f"{folder}: {len(runs)} of {count(len(described.cases))} are finished")
-    if as_json:
-        typer.echo(json.dumps({table.spec.name: table.long() for table in tables}))
-        return
-    for declared in tables:
-        for printed in declared.rich():
-            stdout().print(printed)
-
-
-@contextmanager
-def ending(folder: Path | None = None) -> Iterator[None]:
-    """Turn invalid input and an interruption into a sentence on standard error and an exit code."""
-    try:
-        yield
-    except (StudyError, StoreError) as error:
-        say(str(error))
-        raise typer.Exit(ExitCode.INVALID) from error
-    except KeyboardInterrupt as error:
-        kept = f"; the finished cases are in {folder} and the same command does the rest" if folder else ""
-        say(f"interrupted{kept}")
-        raise typer.Exit(ExitCode.INTERRUPTED) from error
+app.add_typer(folders)

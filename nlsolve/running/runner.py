@@ -16,9 +16,10 @@ from nlsolve.contracts.status import SolveError, Status
 from nlsolve.registry.problems import StudyError, did_you_mean
 from nlsolve.results.costs.cost_prediction import UNITS
 from nlsolve.results.frames import Frames
-from nlsolve.running.store import Part, Store, merge, rounds_of
+from nlsolve.running.store import Part, Store, StoreError, merge, rounds_of
 from nlsolve.running.store.environment import environment_here, name_of
-from nlsolve.running.store.reading import completed, environments_of
+from nlsolve.running.store.parts import Parts
+from nlsolve.running.store.reading import completed, description_of, environments_of, finished, of_one_source
 from nlsolve.running.store.turns import SECONDS_BETWEEN_LOOKS, Turns
 from nlsolve.running.timing import CLOCKS, measure
 from nlsolve.show.figures import FigureError, draw, save
@@ -134,6 +135,27 @@ def run(
     if store is None:
         return Results(study, frames.runs, frames.steps, frames.fields)
     return Results(study, frames.runs, frames.steps, frames.fields, store.folder, _show(store, study, frames))
+
+
+def load(folder: str | Path) -> Results:
+    """The results in a folder, of whatever is finished of the study that it was last used for.
+
+    No study file is needed: the `study` of the results has tables, but no cases and no figures. Where the folder's
+    description of its study is damaged, all its cases are given that one source has computed.
+
+    Raises StoreError when there are none.
+    """
+    place = Path(folder)
+    Parts(place).refuse_old()
+    described = description_of(place)
+    planned = described.cases if described is not None else of_one_source(place)
+    frames = finished(place, planned)
+    if not len(frames.runs):
+        raise StoreError(f"{folder}: no finished cases can be read there")
+    study = Study(place.name, "", ()) if described is None else described.study()
+    left = len(planned) - len(frames.runs)
+    notes = (f"{len(frames.runs)} of {len(planned)} cases are finished",) if left else ()
+    return Results(study, frames.runs, frames.steps, frames.fields, place, notes)
 
 
 def execute(case: Case, number: int, cases: int, tell: Listener, timing: Timing) -> Part:

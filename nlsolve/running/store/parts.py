@@ -161,13 +161,13 @@ def merge(parts: list[Part]) -> Frames:
 
 def write_text(folder: Path, path: Path, text: str) -> None:
     """Write a text file of a results folder whole or not at all."""
-    with _replacing(folder, path) as temporary:
+    with replacing(folder, path) as temporary:
         temporary.write_text(text, encoding="utf-8")
 
 
 def write_frame(folder: Path, path: Path, frame: pd.DataFrame) -> None:
     """Write a frame of a results folder as parquet, whole or not at all."""
-    with _replacing(folder, path) as temporary:
+    with replacing(folder, path) as temporary:
         _storable(frame).to_parquet(temporary, index=False)
 
 
@@ -184,7 +184,7 @@ def writing(folder: Path) -> Iterator[None]:
 
 
 @contextmanager
-def _replacing(folder: Path, path: Path) -> Iterator[Path]:
+def replacing(folder: Path, path: Path) -> Iterator[Path]:
     """A temporary file to write to, which takes the place of `path` when it is complete."""
     temporary = path.with_name(f".{path.name}.{secrets.token_hex(4)}{PARTIAL}")
     with writing(folder):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -11,10 +12,13 @@ from typing import Any
 import pandas as pd
 from pydantic import ValidationError
 
+from nlsolve.contracts.status import Status
 from nlsolve.results.costs.cost_prediction import with_predictions
 from nlsolve.results.frames import Frames, Part
 from nlsolve.results.parameters import names_settings
 from nlsolve.results.reference_error import with_reference_errors
+from nlsolve.results.verdicts import status_of
+from nlsolve.running.store.claims import claimed
 from nlsolve.running.store.identity import Identity, case_of
 from nlsolve.running.store.parts import CASES, Parts, StoreError, merge
 from nlsolve.show.tables import TableSpec
@@ -42,6 +46,10 @@ class Description:
     question: str
     cases: tuple[Planned, ...]
     tables: tuple[TableSpec, ...]
+
+    def study(self) -> Study:
+        """The study with its tables, without its cases and figures."""
+        return Study(self.name, self.question, (), self.tables)
 
 
 def describe(study: Study, identities: Mapping[str, Identity]) -> dict[str, Any]:
@@ -87,6 +95,74 @@ def something_else(folder: Path) -> bool:
         return False
 
 
+def of_one_source(folder: Path) -> tuple[Planned, ...]:
+    """The parts of a folder whose study is not known, under the names they were run by: those that agree with all
+    later ones on the source of every package and the contents of every file.
+    """
+    parts = Parts(folder)
+    entries = [entry for key in parts.names() if (entry := parts.entry(key)) is not None]
+    known: dict[str, str] = {}
+    found: list[Planned] = []
+    for entry in sorted(entries, key=lambda entry: entry.written, reverse=True):
+        needs = {**entry.identity.code, **entry.identity.files}
+        if all(known.setdefault(name, content) == content for name, content in needs.items()):
+            names = {name: str(word) for name, word in entry.parameters.items() if names_settings(name)}
+            found.append(Planned(entry.identity.key, names, ""))
+    return tuple(reversed(found))
+
+
+def is_results_folder(folder: Path) -> bool:
+    """Whether a folder has parts, or a place for them."""
+    return (folder / CASES).is_dir()
+
+
+@dataclass(frozen=True)
+class FolderStatus:
+    """How far a folder is, told from its parts and claims alone.
+
+    study : what it was last used for; None when that cannot be read, and then all parts count as planned.
+    endings : status -> number of planned cases that ended so.
+    failures : case -> message, of those that stopped on an error.
+    running : names of the parts that are being computed now.
+    left : number of planned cases without a part that nobody is computing.
+    others : number of parts of other studies, other settings or earlier sources.
+    """
+
+    study: Description | None
+    planned: int
+    endings: Mapping[str, int]
+    failures: Mapping[str, str]
+    running: tuple[str, ...]
+    left: int
+    others: int
+
+
+def status_of_folder(folder: Path) -> FolderStatus:
+    """How far a folder is. Raises StoreError when it is no results folder."""
+    Parts(folder).refuse_old()
+    if not is_results_folder(folder):
+        raise StoreError(f"{folder}: not a results folder: it has no folder {CASES!r}")
+    parts, described = Parts(folder), description_of(folder)
+    names = parts.names()
+    planned = [case.key for case in described.cases] if described is not None else names
+    entries = [entry for key in planned if (entry := parts.entry(key)) is not None]
+    running = tuple(claimed(folder))
+    done = {entry.identity.key for entry in entries}
+    return FolderStatus(
+        described,
+        len(planned),
+        Counter(str(entry.measured["status"]) for entry in entries),
+        {
+            entry.identity.case: str(entry.measured.get("message"))
+            for entry in entries
+            if status_of(entry.measured) is Status.CRASHED
+        },
+        running,
+        len(set(planned) - done - set(running)),
+        len(set(names) - set(planned)),
+    )
+
+
 def completed(frames: Frames, references: Mapping[str, str]) -> Frames:
     """Frames with the columns of `runs` that compare cases: distance from the reference, predicted seconds."""
     frames = with_reference_errors(frames, references)
@@ -120,7 +196,7 @@ def read_tables(folder: Path) -> tuple[Description, pd.DataFrame]:
     """
     Parts(folder).refuse_old()
     described = description_of(folder)
-    if described is None and (folder / CASES).is_dir():
+    if described is None and is_results_folder(folder):
         raise StoreError(
             f"{folder}: its {STUDY} cannot be read, which has the tables; no case is lost: run the study again with "
             f"--out {folder}"
