@@ -15,7 +15,7 @@ from nlsolve.contracts.linear_solver import LinearSolver
 from nlsolve.contracts.status import SolveError, Status
 from nlsolve.registry.problems import StudyError, did_you_mean
 from nlsolve.results.costs.cost_prediction import UNITS
-from nlsolve.results.frames import Frames
+from nlsolve.results.frames import Frames, rows_of
 from nlsolve.running.store import Part, Store, StoreError, merge, rounds_of
 from nlsolve.running.store.environment import environment_here, name_of
 from nlsolve.running.store.parts import Parts
@@ -106,6 +106,11 @@ def run(
     study = study_of(study, overrides, quick)
     store = None if out is None else Store(Path(out), study)
     tell = listen or (lambda event: None)
+    if store is not None and (unchanged := store.unchanged()) is not None:
+        frames, notes = unchanged
+        for number, (case, row) in enumerate(zip(study.cases, rows_of(frames.runs), strict=True), 1):
+            tell(Event(case, number, len(study.cases), run=row, resumed=True))
+        return Results(study, frames.runs, frames.steps, frames.fields, store.folder, notes)
     turns = Turns(study, store)
     parts = turns.parts
     written = time.monotonic()
@@ -134,7 +139,9 @@ def run(
     frames = _merged(study, parts)
     if store is None:
         return Results(study, frames.runs, frames.steps, frames.fields)
-    return Results(study, frames.runs, frames.steps, frames.fields, store.folder, _show(store, study, frames))
+    notes = _show(store, study, frames)
+    store.mark_shown(notes)
+    return Results(study, frames.runs, frames.steps, frames.fields, store.folder, notes)
 
 
 def load(folder: str | Path) -> Results:

@@ -100,7 +100,12 @@ def test_files(tmp_path):
     figures = {"figures/range.png", "figures/range.pdf"}
     frames = {"runs.parquet", "runs.csv", "steps.parquet", "steps.csv", "fields.parquet"}
     (environment,) = results.runs["environment"].unique()
-    assert names == tables | figures | frames | {"study.json", "report.html", f"environments/{environment}.json"}
+    assert names == tables | figures | frames | {
+        "study.json",
+        "shown.json",
+        "report.html",
+        f"environments/{environment}.json",
+    }
     assert results.notes == ()
     assert pd.read_parquet(folder / "runs.parquet")["tangents"].tolist() == [60, 80, 30, 40]
     report = (folder / "report.html").read_text(encoding="utf-8")
@@ -114,6 +119,30 @@ def test_a_second_run_computes_nothing_and_says_the_same(study, tmp_path, marche
     assert len(marched) == 4
     pd.testing.assert_frame_equal(first.runs, again.runs, check_dtype=False)
     pd.testing.assert_frame_equal(first.steps, again.steps)
+
+
+@pytest.mark.parametrize("gone", ["report.html", "tables/branches.csv", "steps.parquet", "shown.json"])
+def test_what_is_shown_is_made_again_when_it_is_gone_or_damaged(study, tmp_path, gone, marched):
+    first = run(study, tmp_path / "out")
+    content = (tmp_path / "out" / gone).read_bytes()
+    (tmp_path / "out" / gone).unlink()
+    again = run(study, tmp_path / "out")
+    assert (tmp_path / "out" / gone).exists()
+    if not gone.endswith(("html", "json")):  # these have times in them
+        assert (tmp_path / "out" / gone).read_bytes() == content
+    pd.testing.assert_frame_equal(first.runs, again.runs, check_dtype=False)
+    assert len(marched) == 4
+
+
+def test_a_second_run_writes_nothing(study, tmp_path):
+    run(study, tmp_path / "out")
+    times = {path: path.stat().st_mtime_ns for path in (tmp_path / "out").rglob("*") if path.name != "study.json"}
+    again = run(study, tmp_path / "out")
+    assert {path: path.stat().st_mtime_ns for path in times} == times
+    assert again.table("branches").loc[20, 1e-8] == 40
+    retitled = Study.from_toml(write_study(tmp_path, ('name = "branches"', 'name = "b"')), registry=registry_of())
+    run(retitled, tmp_path / "out")
+    assert (tmp_path / "out" / "tables" / "b.csv").exists()
 
 
 def test_a_damaged_part_is_run_again(study, tmp_path, marched):

@@ -9,14 +9,18 @@ from __future__ import annotations
 import json
 from collections.abc import Collection, Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
+
+import pandas as pd
 
 from nlsolve.contracts.status import Status
 from nlsolve.results.frames import Frames, Part
-from nlsolve.running.store.claims import Claims
+from nlsolve.running.store.claims import CLAIMS, Claims
 from nlsolve.running.store.identity import Identity, identity_of
 from nlsolve.running.store.parts import (
     CASES,
+    ENVIRONMENTS,
     Parts,
     StoreError,
     merge,
@@ -24,8 +28,17 @@ from nlsolve.running.store.parts import (
     write_text,
     writing,
 )
-from nlsolve.running.store.reading import STUDY, describe, names_in, something_else
-from nlsolve.running.store.standing import TRIED_AGAIN, Standings, rounds_of
+from nlsolve.running.store.reading import (
+    SHOWN,
+    STUDY,
+    completed,
+    describe,
+    names_in,
+    read_shown,
+    shown_of,
+    something_else,
+)
+from nlsolve.running.store.standing import KEPT, TRIED_AGAIN, Standings, rounds_of
 from nlsolve.study.case import Case
 from nlsolve.study.study import Study
 
@@ -80,6 +93,31 @@ class Store:
     def close(self) -> None:
         """Give up all claims."""
         self._claims.release_all()
+
+    def unchanged(self) -> tuple[Frames, tuple[str, ...]] | None:
+        """All frames and the notes of the last run, where nothing is left to run, to write or to show; else None."""
+        found = [self._standings.of(case) for case in self.study.cases]
+        entries = [standing.entry for standing in found if standing.entry is not None and standing.word == KEPT]
+        if len(entries) < len(found):
+            return None
+        shown = read_shown(self.folder, shown_of(self.study, entries))
+        if shown is None:
+            return None
+        pairs = zip(entries, self.study.cases, strict=True)
+        nothing = pd.DataFrame()
+        rows = [Part(entry.run(names_in(case)), nothing, nothing) for entry, case in pairs]
+        frames, notes = shown
+        references = {case.id: case.reference for case in self.study.cases if case.reference}
+        return completed(replace(frames, runs=merge(rows).runs), references), notes
+
+    def mark_shown(self, notes: Collection[str]) -> None:
+        """Remember by what the tables, figures and report were made that are there now."""
+        entries = [self.parts.entry(self._begun[case.id].key) for case in self.study.cases]
+        files = [path.relative_to(self.folder) for path in self.folder.rglob("*") if path.is_file()]
+        shown = [str(path) for path in files if path.parts[0] not in (CASES, ENVIRONMENTS, CLAIMS, SHOWN)]
+        digest = shown_of(self.study, [entry for entry in entries if entry is not None])
+        document = {"digest": digest, "files": sorted(shown), "notes": list(notes)}
+        self.write_text(SHOWN, json.dumps(document, ensure_ascii=False) + "\n")
 
     def write_frames(self, frames: Frames) -> None:
         """Write runs and steps as parquet and CSV, fields as parquet."""

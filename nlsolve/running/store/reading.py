@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import json
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import pandas as pd
+from pyarrow import ArrowException
 from pydantic import ValidationError
 
 from nlsolve.contracts.status import Status
@@ -20,13 +21,17 @@ from nlsolve.results.reference_error import with_reference_errors
 from nlsolve.results.verdicts import status_of
 from nlsolve.running.store.claims import claimed
 from nlsolve.running.store.identity import Identity, case_of
-from nlsolve.running.store.parts import CASES, Parts, StoreError, merge
+from nlsolve.running.store.parts import CASES, Entry, Parts, StoreError, merge
+from nlsolve.running.store.sources import fingerprint, source_of
 from nlsolve.show.tables import TableSpec
 from nlsolve.study.case import Case
 from nlsolve.study.study import Study
 
-STUDY = "study.json"
-"""Name of the file that describes the study which a folder was last used for."""
+STUDY, SHOWN = "study.json", "shown.json"
+"""Names of the files that describe the study which a folder was last used for, and what was shown of it."""
+
+VIEWS = ("results", "show")
+"""What of nlsolve makes tables, figures and the report."""
 
 
 @dataclass(frozen=True)
@@ -53,13 +58,13 @@ class Description:
 
 
 def describe(study: Study, identities: Mapping[str, Identity]) -> dict[str, Any]:
-    """A study as its folder describes it, in JSON values."""
+    """A study as its folder describes it, in JSON values; parts are named where their identities are given."""
     return {
         "name": study.name,
         "question": study.question,
         "cases": [
             {
-                "key": identities[case.id].key,
+                "key": identities[case.id].key if case.id in identities else case.id,
                 "names": names_in(case),
                 "reference": case.reference,
             }
@@ -161,6 +166,28 @@ def status_of_folder(folder: Path) -> FolderStatus:
         len(set(planned) - done - set(running)),
         len(set(names) - set(planned)),
     )
+
+
+def shown_of(study: Study, entries: Iterable[Entry]) -> str:
+    """A digest of all that the tables, figures and report of a study are made from."""
+    rows = [[entry.identity.key, entry.written] for entry in entries]
+    views = [describe(study, {}), [repr(figure) for figure in study.figures], rows, source_of(VIEWS)]
+    return fingerprint(json.dumps(views).encode())
+
+
+def read_shown(folder: Path, digest: str) -> tuple[Frames, tuple[str, ...]] | None:
+    """The frames of all cases (`runs` as it was written) and the notes of a run after which `digest` was the same.
+
+    None when it was not, or when a file that was written then is gone or damaged.
+    """
+    try:
+        document = json.loads((folder / SHOWN).read_text(encoding="utf-8"))
+        if document["digest"] != digest or not all((folder / name).is_file() for name in document["files"]):
+            return None
+        runs, steps, fields = (pd.read_parquet(folder / f"{name}.parquet") for name in ("runs", "steps", "fields"))
+        return Frames(runs, steps, fields), tuple(document["notes"])
+    except (OSError, ValueError, TypeError, KeyError, ArrowException):
+        return None
 
 
 def completed(frames: Frames, references: Mapping[str, str]) -> Frames:

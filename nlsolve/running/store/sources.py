@@ -59,11 +59,16 @@ def sources_of(cls: type) -> dict[str, str]:
     return found
 
 
-@cache
 def numerics() -> str:
     """The fingerprint of nlsolve's own numerics."""
+    return source_of(NUMERICS)
+
+
+@cache
+def source_of(names: tuple[str, ...]) -> str:
+    """The fingerprint of these files and folders of nlsolve."""
     home = Path(__file__).parents[2]
-    return _of_files(home, (path for name in NUMERICS for path in _files(home / name)))
+    return _of_files(home, (path for name in names for path in _files(home / name)))
 
 
 def _package(top: str, cls: type) -> str:
