@@ -26,13 +26,14 @@ from nlsolve.cli.printing import (
     stdout,
 )
 from nlsolve.cli.progress import Watch
+from nlsolve.contracts.status import InputError, Status
 from nlsolve.registry.problems import StudyError, did_you_mean
 from nlsolve.registry.registry import load_registry
 from nlsolve.results.frames import json_rows
 from nlsolve.running.diagnose import diagnose as diagnostics_of
 from nlsolve.running.forecast import ASSUMPTION, forecast
 from nlsolve.running.runner import run as run_study
-from nlsolve.running.store import StoreError, read_tables
+from nlsolve.running.store import read_tables
 from nlsolve.show.tables import build
 from nlsolve.study.case import section_rows
 from nlsolve.study.study import Study
@@ -85,6 +86,18 @@ def run(
     settings: Settings = None,
     quick: Quick = False,
     as_json: Json = False,
+    jobs: Annotated[
+        int | None,
+        typer.Option(help="cases at a time; default: the physical cores, but 1 for a study that says how it is timed"),
+    ] = None,
+    isolation: Annotated[
+        str | None,
+        typer.Option(metavar="HOW", help="process: each case in a worker process, the default; none: all in this one"),
+    ] = None,
+    pdb: Annotated[bool, typer.Option("--pdb", help="debug an error where it is raised; no isolation")] = False,
+    retry: Annotated[
+        list[str] | None, typer.Option(metavar="STATUS", help="run finished cases of this status again")
+    ] = None,
 ) -> None:
     """Run a study, or the part of it that is not yet in the results folder."""
     folder = out or Path("results") / (study.stem + ("-quick" if quick else ""))
@@ -92,7 +105,15 @@ def run(
     with ending(folder):
         checked = Study.from_toml(study, parse_assignments(settings or []), quick)
         with Watch(console) as watch:
-            results = run_study(checked, folder, listen=watch)
+            results = run_study(
+                checked,
+                folder,
+                listen=watch,
+                isolation=isolation,
+                jobs=jobs,
+                retry=statuses(retry or []),
+                debugger=watch.debug if pdb else None,
+            )
     print_results(results, as_json)
     for line in (*left_out(results.runs), *results.notes):
         say(line)
@@ -175,12 +196,21 @@ def table(
             stdout().print(printed)
 
 
+def statuses(words: list[str]) -> list[Status]:
+    """The statuses of --retry. Raises StudyError for a word that is none."""
+    known = [status.word for status in Status]
+    for word in words:
+        if word not in known:
+            raise StudyError(f"--retry {word!r}: no such status; {did_you_mean(word, known)}")
+    return [Status.of(word) for word in words]
+
+
 @contextmanager
 def ending(folder: Path | None = None) -> Iterator[None]:
     """Turn invalid input and an interruption into a sentence on standard error and an exit code."""
     try:
         yield
-    except (StudyError, StoreError) as error:
+    except InputError as error:
         say(str(error))
         raise typer.Exit(ExitCode.INVALID) from error
     except KeyboardInterrupt as error:

@@ -23,6 +23,19 @@ class Frames:
     fields: pd.DataFrame
 
 
+@dataclass(frozen=True)
+class Part:
+    """The results of one case: its row of `runs`, its rows of `steps` and of `fields`.
+
+    output : what the case has printed, cut in the middle where it is long; empty where nobody has listened.
+    """
+
+    run: Row
+    steps: pd.DataFrame
+    fields: pd.DataFrame
+    output: str = ""
+
+
 def steps_frame(rows: Sequence[Mapping[str, Any]]) -> pd.DataFrame:
     """The rows of one case's `steps`: the documented columns but the case's identity, then the notes of its method."""
     documented = [name for name in STEPS if name != "case"]

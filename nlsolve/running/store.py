@@ -6,7 +6,6 @@ import json
 import os
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -14,31 +13,19 @@ import pandas as pd
 from pandas.api.types import is_object_dtype
 from pyarrow import ArrowException
 
-from nlsolve.contracts.status import InputError, Status
+from nlsolve.contracts.status import InputError
 from nlsolve.results.columns import FIELDS, RUNS, STEPS
-from nlsolve.results.frames import Frames, Row, rows_of
-from nlsolve.results.verdicts import status_of
+from nlsolve.results.frames import Frames, Part, rows_of
+from nlsolve.running.retry import lacks_something
 from nlsolve.show.tables import TableSpec
 from nlsolve.study.study import Study
 
 STUDY, CASES = "study.json", "cases"
 """Names of the file that describes the study, and of the folder of parts."""
 
-TRIED_AGAIN = frozenset({Status.CRASHED, Status.NOT_APPLICABLE})
-"""A case with one of these statuses is run again: what it lacked may have been installed since."""
-
 
 class StoreError(InputError):
     """A results folder cannot be used; the sentence says why, and what to do."""
-
-
-@dataclass(frozen=True)
-class Part:
-    """The results of one case: its row of `runs`, its rows of `steps` and of `fields`."""
-
-    run: Row
-    steps: pd.DataFrame
-    fields: pd.DataFrame
 
 
 def merge(parts: list[Part]) -> Frames:
@@ -71,14 +58,20 @@ class Store:
         try:
             runs, steps, fields = (pd.read_parquet(self._part(case, name)) for name in ("runs", "steps", "fields"))
             (run,) = rows_of(runs)
-            usable = run["case"] == case and status_of(run) not in TRIED_AGAIN
+            usable = run["case"] == case and not lacks_something(run)
         except (OSError, ValueError, KeyError, ArrowException):
             return None
         return Part(run, steps, fields) if usable else None
 
     def save(self, part: Part) -> None:
-        """Write a part. Its row is written last: a part with a row is complete."""
+        """Write a part, and what its case has printed. Its row is written last: a part with a row is complete."""
         case = part.run["case"]
+        output = self.folder / CASES / f"{case}.txt"
+        if part.output:
+            self.write_text(f"{CASES}/{output.name}", part.output)
+        else:
+            with self.writing():
+                output.unlink(missing_ok=True)
         self._parquet(self._part(case, "fields"), part.fields)
         self._parquet(self._part(case, "steps"), part.steps)
         self._parquet(self._part(case, "runs"), pd.DataFrame([part.run]))
