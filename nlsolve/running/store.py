@@ -18,6 +18,7 @@ from nlsolve.results.columns import FIELDS, RUNS, STEPS
 from nlsolve.results.frames import Frames, Part, rows_of
 from nlsolve.running.retry import lacks_something
 from nlsolve.show.tables import TableSpec
+from nlsolve.study.limits import Limits
 from nlsolve.study.study import Study
 
 STUDY, CASES = "study.json", "cases"
@@ -26,6 +27,11 @@ STUDY, CASES = "study.json", "cases"
 
 class StoreError(InputError):
     """A results folder cannot be used; the sentence says why, and what to do."""
+
+
+def output_file(folder: Path, case: str) -> Path:
+    """The file of a results folder that holds what a case has printed; it is there when there is something."""
+    return folder / CASES / f"{case}.txt"
 
 
 def merge(parts: list[Part]) -> Frames:
@@ -46,7 +52,7 @@ class Store:
             (folder / CASES).mkdir(parents=True, exist_ok=True)
         if (folder / STUDY).exists():
             found = _read_study(folder)
-            if found.get("cases") != identity["cases"] or found.get("question") != identity["question"]:
+            if _unlimited(found) != _unlimited(identity) or found.get("question") != identity["question"]:
                 raise StoreError(
                     f"{folder}: the folder holds results of another study, or of this one with other settings "
                     f"({found.get('question', 'no question')!r}): choose another folder with --out, or remove this one"
@@ -66,12 +72,11 @@ class Store:
     def save(self, part: Part) -> None:
         """Write a part, and what its case has printed. Its row is written last: a part with a row is complete."""
         case = part.run["case"]
-        output = self.folder / CASES / f"{case}.txt"
         if part.output:
-            self.write_text(f"{CASES}/{output.name}", part.output)
+            self.write_text(str(output_file(Path(), case)), part.output)
         else:
             with self.writing():
-                output.unlink(missing_ok=True)
+                output_file(self.folder, case).unlink(missing_ok=True)
         self._parquet(self._part(case, "fields"), part.fields)
         self._parquet(self._part(case, "steps"), part.steps)
         self._parquet(self._part(case, "runs"), pd.DataFrame([part.run]))
@@ -146,6 +151,14 @@ def _identity(study: Study) -> dict[str, Any]:
         "question": study.question,
         "cases": {case.id: dict(case.parameters) for case in study.cases},
         "tables": [table.model_dump(mode="json") for table in study.tables],
+    }
+
+
+def _unlimited(identity: dict[str, Any]) -> dict[str, Any]:
+    """The parameters of each case but its limits, which may be changed for the cases that are left."""
+    return {
+        case: {name: value for name, value in parameters.items() if not name.startswith(f"{Limits.noun}.")}
+        for case, parameters in identity.get("cases", {}).items()
     }
 
 

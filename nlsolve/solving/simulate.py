@@ -278,7 +278,8 @@ class _Run:
 def crashed(error: BaseException) -> dict[str, Any]:
     """The row of `runs` for a case that an error of the program or of a plugin has ended: its message and its place."""
     place = traceback.extract_tb(error.__traceback__)[-1]
-    message = f"{type(error).__name__}: {error} ({place.filename}:{place.lineno})"
+    said = f"{type(error).__name__}: {error}" if str(error) else type(error).__name__
+    message = f"{said} ({place.filename}:{place.lineno})"
     return {"status": Status.CRASHED.word, "message": message}
 
 

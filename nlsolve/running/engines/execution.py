@@ -62,15 +62,18 @@ def part_of_error(case: str, parameters: Mapping[str, Any], parts: Any, error: B
     """The part of a case that an error has ended."""
     if isinstance(error, CaseStopped):
         return part_without_record(case, parameters, error.status, error.detail)
-    where = place(frames_of_error(error), origins(parts))
+    frames, known = frames_of_error(error), origins(parts)
     if isinstance(error, MemoryError):
+        where = place(frames, known)
         return part_without_record(case, parameters, Status.OUT_OF_MEMORY, f"MemoryError: {error}{where}")
-    row = {"case": case, **crashed(error), **parameters}
-    if where.endswith(")"):
-        row["message"] += f";{where}"
+    row = crashed(error)
+    owner = next((frame for frame in frames if frame[0] in known), None)
+    if owner is not None:
+        called = "" if owner == frames[0] else ", called at {}:{}".format(*owner)
+        row["message"] += f"{called} in {known[owner[0]]}"
     if not isinstance(error, Exception):
         row["interpreter"] = type(error).__name__
-    return Part(row, pd.DataFrame(), pd.DataFrame())
+    return Part({"case": case, **row, **parameters}, pd.DataFrame(), pd.DataFrame())
 
 
 def part_without_record(

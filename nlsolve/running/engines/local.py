@@ -183,7 +183,8 @@ class _Lane:
         self, worker: WorkerProcess, turn: Turn, task: Task, known: Mapping[str, str]
     ) -> Part | Unreadable | None:
         """The answer of a worker, or the part of a case that was killed at a limit; None when the worker has died."""
-        begun, stopped, stopped_at = _now(), None, 0.0
+        begun = looked = _now()
+        stopped, stopped_at = None, 0.0
         while not self.ending.is_set():
             answer = worker.answer(TICK)
             if isinstance(answer, Progress):
@@ -197,7 +198,10 @@ class _Lane:
                 return replace(answer.part, output=output)
             elif worker.gone:
                 return None
+            elif _now() - looked < TICK / 2:  # it has printed something
+                continue
             elif stopped is None:
+                looked = _now()
                 if _now() - begun > task.limits.seconds:
                     stopped = Status.TIMED_OUT
                 elif worker.resident() > task.limits.bytes:

@@ -38,7 +38,11 @@ ONE_THREAD = dict.fromkeys(
 END_OF_OUTPUT = 500_000
 """Bytes of a case's output that are kept of its beginning, and as many of its end."""
 
-CHUNK = 2**16
+CHUNKS, CHUNK = 64, 2**16
+"""How much of the output is read at a time: so many pieces of so many bytes."""
+
+SECONDS_BETWEEN_FAMILIES = 1.0
+"""How often the descendants of a process are looked for, for which all processes of the machine are read [s]."""
 
 _now = time.monotonic
 
@@ -73,6 +77,8 @@ class WorkerProcess:
         self._first, self._last, self._left_out = bytearray(), bytearray(), 0
         self._noted = 0
         self._code: int | None = None
+        self._family: list[psutil.Process] = []
+        self._looked = self.begun
 
     def begin(self) -> None:
         """Forget the output and the faults there have been: a case begins."""
@@ -98,9 +104,11 @@ class WorkerProcess:
         return None
 
     def resident(self) -> int:
-        """Resident memory of the process and of its descendants [bytes]."""
+        """Resident memory of the process and of its descendants, which are looked for now and then [bytes]."""
+        if _now() - self._looked > SECONDS_BETWEEN_FAMILIES:
+            self._family, self._looked = self.descendants(), _now()
         found = 0
-        for process in (self._process, *self.descendants()):
+        for process in (self._process, *self._family):
             with suppress(psutil.Error):
                 found += process.memory_info().rss
         return found
@@ -160,7 +168,7 @@ class WorkerProcess:
 
     def _drain(self) -> None:
         """Read what there is of the output, at most some chunks of a flood."""
-        for _ in range(16):
+        for _ in range(CHUNKS):
             try:
                 data = os.read(self._output, CHUNK)
             except OSError:  # nothing there now

@@ -17,6 +17,7 @@ import sys
 import time
 from collections.abc import Mapping
 from dataclasses import replace
+from importlib import import_module
 from multiprocessing.connection import Connection
 from types import FrameType
 from typing import Any, NoReturn
@@ -84,7 +85,7 @@ class Worker:
                 return
             if task is None:
                 return
-            self.send(self.answer(task))
+            self.send(self.answer(task), task)
 
     def answer(self, task: Task) -> Ended | Unreadable:
         """Run one case."""
@@ -113,14 +114,13 @@ class Worker:
             self.told = _now()
             self.connection.send(progress)
 
-    def send(self, answer: Ready | Ended | Unreadable) -> None:
+    def send(self, answer: Ready | Ended | Unreadable, task: Task | None = None) -> None:
         """Send an answer; a part that cannot be sent becomes one that says so."""
         try:
             data = pickle.dumps(answer, pickle.HIGHEST_PROTOCOL)
         except Exception as error:  # a value of a plugin's in the rows
-            assert isinstance(answer, Ended)
-            run = answer.part.run
-            data = pickle.dumps(Ended(part_of_error(run["case"], {}, Sections(), error), answer.changed))
+            assert task is not None
+            data = pickle.dumps(Ended(part_of_error(task.case, task.parameters, Sections(), error), "an answer"))
         self.connection.send_bytes(data)
 
     def stop(self, number: int, frame: FrameType | None) -> None:
@@ -173,6 +173,7 @@ def _linux(option: int, value: int) -> None:
 
 def main(connection: int, faults: int, runner: int) -> None:
     """Serve the runner with process id `runner` over two descriptors."""
+    import_module("nlsolve.plugin")  # which plugins import, so that the first case need not wait for it
     worker = Worker(Connection(connection), faults)
     worker.prepare()
     if os.getppid() == runner:  # else it has ended already
