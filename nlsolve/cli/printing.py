@@ -16,6 +16,7 @@ from nlsolve.contracts.status import Status
 from nlsolve.flow.validity import LIMITS
 from nlsolve.registry.registry import PluginRow
 from nlsolve.results.frames import json_rows, rows_of
+from nlsolve.results.verdicts import status_of
 from nlsolve.running.retry import is_final
 from nlsolve.running.runner import Results
 from nlsolve.running.store import output_file
@@ -81,7 +82,7 @@ def say_endings(results: Results) -> None:
     runs = results.runs
     endings = ", ".join(f"{number} {word}" for word, number in runs["status"].value_counts().items())
     say(f"{count(len(runs))}: {endings}; results in {results.folder}")
-    firsts = {Status.of(run["status"]): run for _, run in runs.drop_duplicates("status").iterrows()}
+    firsts = {status_of(run): run for run in rows_of(runs.drop_duplicates("status"))}
     firsts.pop(Status.CONVERGED, None)
     crash = firsts.pop(Status.CRASHED, None)
     for status, run in firsts.items():
@@ -91,9 +92,7 @@ def say_endings(results: Results) -> None:
     kept = sorted({run["status"] for run in rows_of(runs) if is_final(run)})
     if kept:
         options = " ".join(f"--retry {word!r}" for word in kept)
-        say(
-            f"cases that were stopped at a limit are run again when it is raised, these and crashed ones with {options}"
-        )
+        say(f"what was stopped at a limit is run again when the limit is raised, and all of these with {options}")
 
 
 def _printed(results: Results, run: Mapping[str, Any]) -> str:
