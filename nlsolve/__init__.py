@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from nlsolve.running.interactive import compare, solve
     from nlsolve.running.march import March, march
     from nlsolve.running.runner import Event, Results, load, run
-    from nlsolve.running.store import StoreError
+    from nlsolve.running.store.parts import StoreError
     from nlsolve.solving.simulate import Progress
     from nlsolve.study.study import Study
 
@@ -33,7 +33,7 @@ _HOME = {
     "Results": "nlsolve.running.runner",
     "SolveError": "nlsolve.contracts.status",
     "Status": "nlsolve.contracts.status",
-    "StoreError": "nlsolve.running.store",
+    "StoreError": "nlsolve.running.store.parts",
     "Study": "nlsolve.study.study",
     "StudyError": "nlsolve.registry.problems",
     "March": "nlsolve.running.march",

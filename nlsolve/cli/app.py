@@ -24,6 +24,8 @@ from nlsolve.cli.printing import (
     say_endings,
 )
 from nlsolve.cli.progress import Watch
+from nlsolve.contracts.status import Status
+from nlsolve.registry.problems import StudyError, did_you_mean
 from nlsolve.registry.registry import load_registry
 from nlsolve.results.frames import json_rows
 from nlsolve.running.diagnose import diagnose as diagnostics_of
@@ -63,6 +65,18 @@ def run(
     settings: Settings = None,
     quick: Quick = False,
     as_json: Json = False,
+    jobs: Annotated[
+        int | None,
+        typer.Option(help="cases at a time; default: the physical cores, but 1 for a study that says how it is timed"),
+    ] = None,
+    isolation: Annotated[
+        str | None,
+        typer.Option(metavar="HOW", help="process: each case in a worker process, the default; none: all in this one"),
+    ] = None,
+    pdb: Annotated[bool, typer.Option("--pdb", help="debug an error where it is raised; no isolation")] = False,
+    retry: Annotated[
+        list[str] | None, typer.Option(metavar="STATUS", help="run finished cases of this status again")
+    ] = None,
 ) -> None:
     """Run a study, or the part of it that is not yet in the results folder."""
     folder = out or default_folder(study, quick)
@@ -70,7 +84,15 @@ def run(
     with ending(folder):
         checked = Study.from_toml(study, parse_assignments(settings or []), quick)
         with Watch(console) as watch:
-            results = run_study(checked, folder, listen=watch)
+            results = run_study(
+                checked,
+                folder,
+                listen=watch,
+                isolation=isolation,
+                jobs=jobs,
+                retry=statuses(retry or []),
+                debugger=watch.debug if pdb else None,
+            )
     print_results(results, as_json)
     for line in (*left_out(results.runs), *results.notes):
         say(line)
@@ -138,6 +160,15 @@ def plugins(as_json: Json = False) -> None:
         typer.echo(json.dumps(to_jsonable_python([asdict(row) for row in rows])))
         return
     print_plugins(rows)
+
+
+def statuses(words: list[str]) -> list[Status]:
+    """The statuses of --retry. Raises StudyError for a word that is none."""
+    known = [status.word for status in Status]
+    for word in words:
+        if word not in known:
+            raise StudyError(f"--retry {word!r}: no such status; {did_you_mean(word, known)}")
+    return [Status.of(word) for word in words]
 
 
 app.add_typer(folders)

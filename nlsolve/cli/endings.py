@@ -10,8 +10,7 @@ from pathlib import Path
 import typer
 
 from nlsolve.cli.printing import say
-from nlsolve.registry.problems import StudyError
-from nlsolve.running.store import StoreError
+from nlsolve.contracts.status import InputError
 
 
 class ExitCode(IntEnum):
@@ -28,7 +27,7 @@ def ending(folder: Path | None = None) -> Iterator[None]:
     """Turn invalid input and an interruption into a sentence on standard error and an exit code."""
     try:
         yield
-    except (StudyError, StoreError) as error:
+    except InputError as error:
         say(str(error))
         raise typer.Exit(ExitCode.INVALID) from error
     except KeyboardInterrupt as error:

@@ -17,10 +17,10 @@ from nlsolve.plugin import InputFile
 from nlsolve.registry.problems import StudyError
 from nlsolve.results.columns import FIELDS, RUNS, STEPS
 from nlsolve.running.runner import Event, Results, run
-from nlsolve.running.store import Store
 from nlsolve.running.store.identity import identity_of
 from nlsolve.running.store.parts import Parts
 from nlsolve.running.store.standing import standings_of
+from nlsolve.running.store.store import Store
 from nlsolve.study.study import Study
 
 FIGURE = '[[figure]]\nkind = "line"\nname = "range"\ny = "range"\ngroup = ["solver.order", "solver.tolerance"]\n[quick]'
@@ -53,7 +53,7 @@ def marched(monkeypatch) -> list:
         cases.append(parts)
         return fake_march(parts, listen)
 
-    monkeypatch.setattr("nlsolve.running.runner.run_case", march)
+    monkeypatch.setattr("nlsolve.running.engines.execution.run_case", march)
     return cases
 
 
@@ -68,7 +68,7 @@ def failing_on(monkeypatch, number: int, error: BaseException) -> None:
             raise error
         return fake_march(parts, listen)
 
-    monkeypatch.setattr("nlsolve.running.runner.run_case", march)
+    monkeypatch.setattr("nlsolve.running.engines.execution.run_case", march)
 
 
 def test_in_memory(study, tmp_path):
@@ -169,13 +169,13 @@ def test_a_crash_is_a_row_that_says_what_and_where(study, tmp_path, monkeypatch,
 
 
 def test_an_interruption_leaves_what_is_finished(study, tmp_path, monkeypatch, marched):
-    march = nlsolve.running.runner.run_case
+    march = nlsolve.running.engines.execution.run_case
     failing_on(monkeypatch, 3, KeyboardInterrupt())
     with pytest.raises(KeyboardInterrupt):
         run(study, tmp_path / "out")
     assert pd.read_parquet(tmp_path / "out" / "runs.parquet")["tangents"].tolist() == [60, 80]
     assert len(pd.read_csv(tmp_path / "out" / "steps.csv")) == 4
-    monkeypatch.setattr("nlsolve.running.runner.run_case", march)
+    monkeypatch.setattr("nlsolve.running.engines.execution.run_case", march)
     assert run(study, tmp_path / "out").runs["tangents"].tolist() == [60, 80, 30, 40]
     assert len(marched) == 2, "the two finished cases were not run again"
 
@@ -244,7 +244,7 @@ def test_a_case_has_one_thread(study, monkeypatch):
         seen.extend(pool["num_threads"] for pool in threadpool_info())
         return fake_march(parts, listen)
 
-    monkeypatch.setattr("nlsolve.running.runner.run_case", march)
+    monkeypatch.setattr("nlsolve.running.engines.execution.run_case", march)
     run(study)
     assert seen
     assert set(seen) == {1}

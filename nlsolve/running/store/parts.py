@@ -3,6 +3,7 @@
     cases/KEY.json               its identity, its row of `runs`, and how long its frames are; written last
     cases/KEY.steps.parquet      its rows of `steps`, if it has any
     cases/KEY.fields.parquet     its rows of `fields`, if it has any
+    cases/KEY.txt                what it has printed, if anything
     environments/NAME.json       where rows were computed, once for all rows that share it
 
 A part whose JSON is there is complete. Every file is written beside its place and then moved there, so none is torn.
@@ -117,6 +118,12 @@ class Parts:
                 path = self._path(identity.key, name)
                 write_frame(self.folder, path, frame)
                 sizes[name] = path.stat().st_size
+        output = output_path(self.folder, identity.key)
+        if part.output:
+            write_text(self.folder, output, part.output)
+        else:
+            with writing(self.folder):
+                output.unlink(missing_ok=True)
         self._keep(part.environment)
         held = {
             "identity": identity.plain(),
@@ -149,6 +156,11 @@ class Parts:
             return [name for name in os.listdir(self.folder / CASES) if not name.startswith(".")]
         except OSError:
             return []
+
+
+def output_path(folder: Path, key: str) -> Path:
+    """Where the output of a case is kept, if it has printed anything."""
+    return folder / CASES / f"{key}.txt"
 
 
 def merge(parts: list[Part]) -> Frames:

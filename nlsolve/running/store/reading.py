@@ -13,7 +13,7 @@ import pandas as pd
 from pyarrow import ArrowException
 from pydantic import ValidationError
 
-from nlsolve.contracts.status import Status
+from nlsolve.contracts.status import STOPPED, Status
 from nlsolve.results.costs.cost_prediction import with_predictions
 from nlsolve.results.frames import Frames, Part
 from nlsolve.results.parameters import names_settings
@@ -21,7 +21,7 @@ from nlsolve.results.reference_error import with_reference_errors
 from nlsolve.results.verdicts import status_of
 from nlsolve.running.store.claims import claimed
 from nlsolve.running.store.identity import Identity, case_of
-from nlsolve.running.store.parts import CASES, Entry, Parts, StoreError, merge
+from nlsolve.running.store.parts import CASES, Entry, Parts, StoreError, merge, output_path
 from nlsolve.running.store.sources import fingerprint, source_of
 from nlsolve.show.tables import TableSpec
 from nlsolve.study.case import Case
@@ -116,6 +116,13 @@ def of_one_source(folder: Path) -> tuple[Planned, ...]:
     return tuple(reversed(found))
 
 
+def output_file(folder: Path, case: str) -> Path | None:
+    """The file that holds what a case of the folder's study has printed; None when it has printed nothing."""
+    described = description_of(folder)
+    keys = [planned.key for planned in described.cases if case_of(planned.key) == case] if described else []
+    return next((path for key in keys if (path := output_path(folder, key)).exists()), None)
+
+
 def is_results_folder(folder: Path) -> bool:
     """Whether a folder has parts, or a place for them."""
     return (folder / CASES).is_dir()
@@ -127,7 +134,7 @@ class FolderStatus:
 
     study : what it was last used for; None when that cannot be read, and then all parts count as planned.
     endings : status -> number of planned cases that ended so.
-    failures : case -> message, of those that stopped on an error.
+    failures : case -> message, of those that stopped on an error or at a limit.
     running : names of the parts that are being computed now.
     left : number of planned cases without a part that nobody is computing.
     others : number of parts of other studies, other settings or earlier sources.
@@ -160,7 +167,7 @@ def status_of_folder(folder: Path) -> FolderStatus:
         {
             entry.identity.case: str(entry.measured.get("message"))
             for entry in entries
-            if status_of(entry.measured) is Status.CRASHED
+            if status_of(entry.measured) in {Status.CRASHED, *STOPPED}
         },
         running,
         len(set(planned) - done - set(running)),

@@ -11,14 +11,12 @@ from typing import Any
 from nlsolve.contracts.status import Status
 from nlsolve.results.costs.cost_prediction import UNITS
 from nlsolve.results.verdicts import number, status_of
+from nlsolve.running.retry import is_final, is_tried_again
 from nlsolve.running.store.identity import Identity, case_of, identity_of
 from nlsolve.running.store.parts import Entry, Parts
 from nlsolve.study.case import Case
 from nlsolve.study.study import Study
 from nlsolve.study.timing import Timing
-
-TRIED_AGAIN = frozenset({Status.CRASHED, Status.NOT_APPLICABLE})
-"""A case with one of these statuses is run again: what it lacked may have been installed since."""
 
 KEPT, NEW, DAMAGED, TIMED = "kept", "new", "damaged", "timed again"
 """Words for a case: its part is kept, there is none, it cannot be read, or its seconds were taken in another way."""
@@ -40,11 +38,13 @@ class Standing:
 class Standings:
     """What a folder has of cases, looked up one by one; the folder need not exist, and is not written.
 
+    retry : see `is_tried_again`.
+
     A part that was written since counts whatever its status: another run has just tried the case.
     """
 
-    def __init__(self, parts: Parts, timing: Timing, retried: Collection[Status] = TRIED_AGAIN) -> None:
-        self.parts, self.timing, self.retried = parts, timing, retried
+    def __init__(self, parts: Parts, timing: Timing, retry: Collection[Status] = ()) -> None:
+        self.parts, self.timing, self.retry = parts, timing, retry
         self.begun = time.time()
         self._keys: defaultdict[str, list[str]] = defaultdict(list)
         for key in parts.names():
@@ -56,10 +56,10 @@ class Standings:
         entry = self.parts.entry(identity.key)
         if entry is None:
             return Standing(identity, self._why(identity))
-        status = status_of(entry.measured)
-        if status in self.retried and entry.written < self.begun:
-            return Standing(identity, f"retried ({status.word})")
-        enough = rounds_of(entry.measured, self.timing) >= self.timing.rounds
+        run = entry.run({})
+        if is_tried_again(run, case.parts.limits, self.retry) and entry.written < self.begun:
+            return Standing(identity, f"retried ({status_of(run).word})")
+        enough = is_final(run) or rounds_of(run, self.timing) >= self.timing.rounds
         return Standing(identity, KEPT if enough else TIMED, entry)
 
     def _why(self, identity: Identity) -> str:
@@ -74,9 +74,9 @@ class Standings:
         return ", ".join(identity.changes_since(last.identity))
 
 
-def standings_of(parts: Parts, study: Study) -> dict[str, str]:
+def standings_of(parts: Parts, study: Study, retry: Collection[Status] = ()) -> dict[str, str]:
     """Case -> its word, for every case of a study."""
-    found = Standings(parts, study.timing)
+    found = Standings(parts, study.timing, retry)
     return {case.id: found.of(case).word for case in study.cases}
 
 

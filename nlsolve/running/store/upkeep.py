@@ -8,12 +8,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from zipfile import ZIP_DEFLATED, ZipFile
 
+from nlsolve.contracts.status import STOPPED
 from nlsolve.results.verdicts import status_of
+from nlsolve.running.retry import TRIED_AGAIN
 from nlsolve.running.store.claims import CLAIMS, LOCK, claimed
 from nlsolve.running.store.identity import case_of, identity_of
 from nlsolve.running.store.parts import CASES, ENVIRONMENTS, PARTIAL, Entry, Parts, StoreError, replacing, writing
 from nlsolve.running.store.reading import STUDY, description_of, is_results_folder
-from nlsolve.running.store.standing import TRIED_AGAIN
 from nlsolve.study.study import Study
 
 HOW_TO_RERUN = """{question}
@@ -69,14 +70,14 @@ def merge_folders(source: Path, into: Path) -> Merged:
 
 
 def _failed(entry: Entry) -> bool:
-    return status_of(entry.measured) in TRIED_AGAIN
+    return status_of(entry.measured) in {*TRIED_AGAIN, *STOPPED}
 
 
 def _copy(source: Path, into: Path, key: str, entry: Entry) -> None:
     """Copy one part, its JSON last."""
     environment = Path(ENVIRONMENTS) / f"{entry.measured.get('environment')}.json"
     names = [Path(CASES) / f"{key}.{name}.parquet" for name in entry.frames]
-    for name in (environment, *names, Path(CASES) / f"{key}.json"):
+    for name in (environment, *names, Path(CASES) / f"{key}.txt", Path(CASES) / f"{key}.json"):
         if (source / name).is_file():
             _copy_file(into, source / name, into / name)
 
@@ -159,7 +160,7 @@ def _results_of(folder: Path, entries: Mapping[str, Entry], environments: Iterab
     shown = [
         path for path in folder.rglob("*") if path.relative_to(folder).parts[0] not in (CASES, ENVIRONMENTS, CLAIMS)
     ]
-    kept = [folder / CASES / f"{key}.json" for key in entries]
+    kept = [folder / CASES / f"{key}{suffix}" for key in entries for suffix in (".json", ".txt")]
     kept += [folder / CASES / f"{key}.{name}.parquet" for key, entry in entries.items() for name in entry.frames]
     kept += [folder / ENVIRONMENTS / f"{name}.json" for name in environments]
     return sorted(path for path in (*shown, *kept) if path.is_file() and not path.name.startswith("."))

@@ -10,11 +10,12 @@ from fakes import registry_of, write_study
 
 from nlsolve.contracts.status import Status
 from nlsolve.results.columns import RUNS
-from nlsolve.running.store import Part, Store, StoreError, merge
+from nlsolve.results.frames import Part
 from nlsolve.running.store.identity import identity_of
-from nlsolve.running.store.parts import Parts
+from nlsolve.running.store.parts import Parts, StoreError, merge
 from nlsolve.running.store.reading import read_tables
 from nlsolve.running.store.standing import standings_of
+from nlsolve.running.store.store import Store
 from nlsolve.study.study import Study
 
 

@@ -13,11 +13,11 @@ from typer.testing import CliRunner
 
 import nlsolve
 from nlsolve.cli.app import app
-from nlsolve.running.store import Store, StoreError
 from nlsolve.running.store.claims import Claims
 from nlsolve.running.store.identity import Identity, identity_of
-from nlsolve.running.store.parts import Parts
+from nlsolve.running.store.parts import Parts, StoreError
 from nlsolve.running.store.reading import status_of_folder
+from nlsolve.running.store.store import Store
 from nlsolve.running.store.upkeep import Merged, merge_folders, superfluous
 from nlsolve.study.study import Study
 

@@ -14,9 +14,9 @@ import pytest
 from fakes import registry_of, write_study
 
 from nlsolve.results.frames import Part
-from nlsolve.running.store import Store
 from nlsolve.running.store.claims import CLAIMS, Claims, claimed
-from nlsolve.running.store.turns import Turns
+from nlsolve.running.store.store import Store
+from nlsolve.running.turns import Turns
 from nlsolve.study.study import Study
 
 HOLDER = """
