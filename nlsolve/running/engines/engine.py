@@ -49,6 +49,13 @@ class Turn:
         return Event(self.case, self.number, self.cases, progress, run)
 
 
+Turns = Iterator[Turn | None]
+"""The turns that are left; None: there are some, but all are held by others at present."""
+
+SECONDS_BETWEEN_LOOKS = 0.1
+"""How soon an engine with nothing to do asks again for a turn that is held by others [s]."""
+
+
 class Engine(ABC):
     """Runs cases.
 

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator, Iterator
+import time
+from collections.abc import Generator
 
 from nlsolve.results.frames import Part
-from nlsolve.running.engines.engine import Engine, Listener, Turn
+from nlsolve.running.engines.engine import SECONDS_BETWEEN_LOOKS, Engine, Listener, Turn, Turns
 from nlsolve.running.engines.execution import Debugger, execute
 from nlsolve.study.timing import Timing
 
@@ -20,9 +21,12 @@ class InProcess(Engine):
         super().__init__()
         self.debugger = debugger
 
-    def parts(self, turns: Iterator[Turn], timing: Timing, tell: Listener) -> Generator[tuple[Turn, Part], None, None]:
+    def parts(self, turns: Turns, timing: Timing, tell: Listener) -> Generator[tuple[Turn, Part], None, None]:
         """Yields the turns in their order."""
         for turn in turns:
+            if turn is None:
+                time.sleep(SECONDS_BETWEEN_LOOKS)
+                continue
             tell(turn.event())
             yield turn, run_here(turn, timing, tell, self.debugger)
 

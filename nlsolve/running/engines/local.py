@@ -6,12 +6,13 @@ import queue
 import signal
 import threading
 import time
-from collections.abc import Generator, Iterator, Mapping
+from collections.abc import Generator, Mapping
 from dataclasses import dataclass, replace
+from typing import Any
 
 from nlsolve.contracts.status import InputError, Status
 from nlsolve.results.frames import Part
-from nlsolve.running.engines.engine import Engine, Listener, Turn
+from nlsolve.running.engines.engine import SECONDS_BETWEEN_LOOKS, Engine, Listener, Turn, Turns
 from nlsolve.running.engines.execution import part_without_record
 from nlsolve.running.engines.in_process import run_here
 from nlsolve.running.engines.places import frames_of_dump, origins, place
@@ -36,6 +37,8 @@ START = 120.0
 KILLED = frozenset({signal.SIGKILL, signal.SIGTERM, signal.SIGHUP})
 """Signals that come from outside; a case whose process got one is run once more."""
 
+END = object()
+
 _now = time.monotonic
 
 
@@ -55,55 +58,90 @@ class Workers(Engine):
         super().__init__()
         self.jobs = jobs
 
-    def parts(self, turns: Iterator[Turn], timing: Timing, tell: Listener) -> Generator[tuple[Turn, Part], None, None]:
+    def parts(self, turns: Turns, timing: Timing, tell: Listener) -> Generator[tuple[Turn, Part], None, None]:
         """Yields the turns as they end. A case that cannot go to a worker is run here, and a note says so."""
-        reports: queue.SimpleQueue[_Report] = queue.SimpleQueue()
-        lanes: list[_Lane] = []
-        free: list[_Lane] = []
-        running, more = 0, True
+        crew, more = _Crew(self.jobs), True
         try:
-            while more or running:
-                while more and (free or len(lanes) < self.jobs):
-                    turn = next(turns, None)
-                    if turn is None:
+            while more or crew.running:
+                held = False
+                while more and not held and crew.has_room:
+                    turn: Any = next(turns, END)
+                    if turn is END:
                         more = False
-                        break
-                    tell(turn.event())
-                    try:
-                        task = packed(turn.case, timing)
-                    except NotPortable as reason:
-                        yield turn, self._here(turn, timing, tell, str(reason))
-                        continue
-                    if not free:
-                        lanes.append(_Lane(reports))
-                        free.append(lanes[-1])
-                    free.pop().give(turn, task)
-                    running += 1
-                if not running:
+                    elif turn is None:
+                        held = True
+                    else:
+                        tell(turn.event())
+                        try:
+                            crew.give(turn, packed(turn.case, timing))
+                        except NotPortable as reason:
+                            yield turn, self._here(turn, timing, tell, str(reason))
+                report = crew.report(SECONDS_BETWEEN_LOOKS if held else None)
+                if report is None:
                     continue
-                report = reports.get()
-                if isinstance(report.what, Progress):
-                    tell(report.turn.event(report.what))
-                    continue
-                running -= 1
-                free.append(report.lane)
-                if isinstance(report.what, Exception):
-                    raise report.what
                 for sentence in report.lane.notes:
                     self.note(sentence)
-                if isinstance(report.what, Unreadable):
+                if isinstance(report.what, Exception):
+                    raise report.what
+                if isinstance(report.what, Progress):
+                    tell(report.turn.event(report.what))
+                elif isinstance(report.what, Unreadable):
                     yield report.turn, self._here(report.turn, timing, tell, report.what.reason)
                 else:
                     yield report.turn, report.what
         finally:
-            for lane in lanes:
-                lane.end()
-            for lane in lanes:
-                lane.thread.join()
+            crew.end()
 
     def _here(self, turn: Turn, timing: Timing, tell: Listener, reason: str) -> Part:
         self.note(f"{reason}: its cases were run in this process, one after the other and without limits")
         return run_here(turn, timing, tell)
+
+
+class _Crew:
+    """The lanes of an engine.
+
+    running : number of turns that are given and have not ended.
+    """
+
+    def __init__(self, jobs: int) -> None:
+        self.jobs, self.running = jobs, 0
+        self._reports: queue.SimpleQueue[_Report] = queue.SimpleQueue()
+        self._lanes: list[_Lane] = []
+        self._free: list[_Lane] = []
+
+    @property
+    def has_room(self) -> bool:
+        """Whether another turn can be given."""
+        return self.running < self.jobs
+
+    def give(self, turn: Turn, task: Task) -> None:
+        """Have a task done by a lane that is free, or a new one."""
+        if not self._free:
+            self._free.append(_Lane(self._reports))
+            self._lanes.append(self._free[-1])
+        self._free.pop().give(turn, task)
+        self.running += 1
+
+    def report(self, seconds: float | None) -> _Report | None:
+        """What a lane tells next; None when nothing runs, or nothing is told within `seconds`."""
+        if not self.running:
+            time.sleep(seconds or 0.0)
+            return None
+        try:
+            report = self._reports.get(timeout=seconds)
+        except queue.Empty:
+            return None
+        if not isinstance(report.what, Progress):
+            self.running -= 1
+            self._free.append(report.lane)
+        return report
+
+    def end(self) -> None:
+        """Stop whatever runs."""
+        for lane in self._lanes:
+            lane.end()
+        for lane in self._lanes:
+            lane.thread.join()
 
 
 class _Lane:
