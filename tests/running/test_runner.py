@@ -217,7 +217,7 @@ def test_a_case_whose_file_changes_while_it_runs_is_not_kept(tmp_path, monkeypat
         place.write_text("new", encoding="utf-8")
         return fake_march(parts, listen)
 
-    monkeypatch.setattr("nlsolve.running.runner.run_case", march)
+    monkeypatch.setattr("nlsolve.running.engines.execution.run_case", march)
     assert len(run(study, tmp_path / "out").runs) == 4
     words = standings_of(Parts(tmp_path / "out"), study)
     assert list(words.values()) == ["new", "kept", "kept", "kept"], "the first case began with the old file"

@@ -14,6 +14,7 @@ import pytest
 from fakes import registry_of, write_study
 
 from nlsolve.results.frames import Part
+from nlsolve.running.engines.engine import Event, Turn
 from nlsolve.running.store.claims import CLAIMS, Claims, claimed
 from nlsolve.running.store.store import Store
 from nlsolve.running.turns import Turns
@@ -39,10 +40,22 @@ def part(case, **run) -> Part:
     return Part({"case": case.id, **measured, **run, **case.parameters}, pd.DataFrame(), pd.DataFrame())
 
 
-def do(turns: Turns, store: Store, turn, **run) -> None:
-    turns.parts[turn.case.id] = part(turn.case, **{"rounds": turn.round, **run})
-    store.save(turn.case, turns.parts[turn.case.id])
-    store.end(turn.case)
+class Run:
+    """One run on the folder."""
+
+    def __init__(self, folder: Path, study: Study) -> None:
+        self.store = Store(folder, study)
+        self.turns = Turns(study, self.store)
+        self.told: list[Event] = []
+        self.each = self.turns.each(self.told.append)
+
+    def next(self) -> Turn:
+        turn = next(self.each)
+        assert turn is not None, "all that are left are held"
+        return turn
+
+    def end(self, turn: Turn, **run) -> None:
+        self.turns.end(turn, part(turn.case, **run))
 
 
 def test_a_claim_is_one_run_s_until_it_is_released(tmp_path):
@@ -104,65 +117,68 @@ def test_where_there_are_no_locks_every_claim_is_granted(tmp_path, monkeypatch):
 
 
 def test_two_runs_take_different_cases_and_read_each_other_s(tmp_path, study):
-    stores = [Store(tmp_path / "out", study) for _ in range(2)]
-    first, second = (Turns(study, store) for store in stores)
-    taken = [turns.take() for turns in (first, second, first, second)]
-    assert [turn.case.id for turn in taken] == [case.id for case in study.cases]
-    assert first.take() is None, "the second run holds what is left"
-    assert first.left == 2
-    for turn, turns, store in zip(taken, (first, second) * 2, stores * 2, strict=True):
-        do(turns, store, turn, tangents=turn.number)
-    for turns in (first, second):
-        rest = [turns.take(), turns.take()]
-        assert all(turn is not None and turns.is_done(turn) for turn in rest)
-        assert turns.left == 0
-        assert sorted(part.run["tangents"] for part in turns.parts.values()) == [1, 2, 3, 4]
+    first, second = runs = [Run(tmp_path / "out", study) for _ in range(2)]
+    taken = [(run, run.next()) for run in (first, second, first, second)]
+    assert [turn.case.id for _, turn in taken] == [case.id for case in study.cases]
+    assert next(first.each) is None, "the second run holds what is left"
+    for run, turn in taken:
+        run.end(turn, tangents=turn.number)
+    for run in runs:
+        assert list(run.each) == []
+        assert len(run.told) == 2
+        assert all(event.resumed for event in run.told)
+        assert sorted(part.run["tangents"] for part in run.turns.parts.values()) == [1, 2, 3, 4]
     assert claimed(tmp_path / "out") == []
 
 
 def test_a_case_that_another_run_has_just_seen_fail_is_not_tried_at_once(tmp_path, study):
-    stores = [Store(tmp_path / "out", study) for _ in range(2)]
-    first, second = (Turns(study, store) for store in stores)
-    turn = first.take()
-    do(first, stores[0], turn, status="crashed", rounds=None)
-    again = second.take()
-    assert again.case == turn.case
-    assert second.is_done(again)
-    third = Turns(study, Store(tmp_path / "out", study))
-    assert not third.is_done(third.take()), "a later run tries it"
+    first, second = (Run(tmp_path / "out", study) for _ in range(2))
+    turn = first.next()
+    first.end(turn, status="crashed", rounds=None)
+    assert second.next().case == study.cases[1]
+    assert [event.case for event in second.told] == [turn.case]
+    assert Run(tmp_path / "out", study).next().case == turn.case, "a later run tries it"
 
 
 def test_the_cases_of_a_run_that_ended_are_taken_over(tmp_path, study):
-    stores = [Store(tmp_path / "out", study) for _ in range(2)]
-    first, second = (Turns(study, store) for store in stores)
-    lost = first.take()
-    assert [second.take().number for _ in range(3)] == [2, 3, 4]
-    assert second.take() is None
-    stores[0].close()
-    turn = second.take()
-    assert turn is not None
-    assert (turn.number, second.is_done(turn)) == (lost.number, False)
+    first, second = (Run(tmp_path / "out", study) for _ in range(2))
+    lost = first.next()
+    assert [second.next().number for _ in range(3)] == [2, 3, 4]
+    assert next(second.each) is None
+    first.store.close()
+    assert second.next() == lost
+    assert second.told == []
 
 
 def test_rounds_of_a_case_come_one_after_the_other(tmp_path):
     study = Study.from_toml(write_study(tmp_path), {"timing.rounds": 2}, registry=registry_of())
-    stores = [Store(tmp_path / "out", study) for _ in range(2)]
-    first, second = (Turns(study, store) for store in stores)
-    held = first.take()
-    others = [second.take() for _ in range(3)]
+    first, second = (Run(tmp_path / "out", study) for _ in range(2))
+    held = first.next()
+    others = [second.next() for _ in range(3)]
+    assert next(second.each) is None, "their second rounds wait for their first"
     for turn in others:
-        do(second, stores[1], turn)
-    again = [second.take() for _ in range(3)]
-    assert [(turn.round, turn.case.id) for turn in again] == [(2, turn.case.id) for turn in others]
-    assert second.take() is None, "the first case is held, and its second round waits for its first"
-    do(first, stores[0], held)
-    assert [(turn.round, second.is_done(turn)) for turn in (second.take(), second.take())] == [(1, True), (2, False)]
+        second.end(turn)
+    again = [second.next() for _ in range(3)]
+    assert [turn.case.id for turn in again] == [turn.case.id for turn in others]
+    assert next(second.each) is None, "the first case is held, and its second round waits for its first"
+    first.end(held)
+    assert second.next().case == held.case
+    assert [event.number for event in second.told] == [1]
+    second.end(again[0])
+    assert second.turns.parts[again[0].case.id].run["rounds"] == 2
+
+
+def test_turns_without_a_folder_are_all_of_them(study):
+    turns = Turns(study, None)
+    found = [turn for turn in turns.each(lambda event: None) if turn is not None and turns.end(turn, part(turn.case))]
+    assert [turn.number for turn in found] == [1, 2, 3, 4]
 
 
 RUNNER = """
 import sys, time
 from fakes import fake_march, registry_of
 from nlsolve.running import runner
+from nlsolve.running.engines import execution
 from nlsolve.study.study import Study
 
 def march(parts, listen, clock):
@@ -171,16 +187,16 @@ def march(parts, listen, clock):
     time.sleep(0.02)
     return fake_march(parts, listen)
 
-runner.run_case = march
+execution.run_case = march
 study = Study.from_toml(sys.argv[1], registry=registry_of())
-results = runner.run(study, sys.argv[2])
+results = runner.run(study, sys.argv[2], isolation="none")
 assert results.runs["case"].tolist() == [case.id for case in study.cases]
 print(len(results.runs))
 """
 
 
 def started(tmp_path: Path, study: Path, log: str) -> subprocess.Popen[str]:
-    environment = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[2])}
+    environment = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[1])}
     arguments = [sys.executable, "-c", RUNNER, str(study), str(tmp_path / "out"), str(tmp_path / log)]
     return subprocess.Popen(arguments, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=environment)
 
@@ -201,10 +217,11 @@ def assert_whole(folder: Path, cases: int) -> None:
     assert list((folder / CLAIMS).iterdir()) == []
 
 
+@pytest.mark.slow
 def test_two_processes_on_one_folder_compute_each_case_once(tmp_path):
     study = forty(tmp_path)
     runs = [started(tmp_path, study, log) for log in ("first", "second")]
-    told = [run.communicate(timeout=120) for run in runs]
+    told = [run.communicate(timeout=900) for run in runs]
     assert [out for out, _ in told] == ["40\n", "40\n"], told
     computed = [(tmp_path / log).read_text().split() for log in ("first", "second")]
     assert sorted(map(int, computed[0] + computed[1])) == list(range(2, 42))
@@ -224,7 +241,7 @@ def test_a_runner_killed_at_ten_moments_loses_the_running_case_only(tmp_path):
         run.communicate()
         computed = (tmp_path / "log").read_text().split()
         assert all(path.stat().st_size for path in (tmp_path / "out" / "cases").glob("[!.]*"))
-    out, error = started(tmp_path, study, "log").communicate(timeout=120)
+    out, error = started(tmp_path, study, "log").communicate(timeout=900)
     assert out == "40\n", error
     computed = (tmp_path / "log").read_text().split()
     assert len(computed) <= 40 + 10, "at most the case that was running is computed again"

@@ -66,7 +66,7 @@ class Engine(ABC):
         self.notes: list[str] = []
 
     @abstractmethod
-    def parts(self, turns: Iterator[Turn], timing: Timing, tell: Listener) -> Generator[tuple[Turn, Part], None, None]:
+    def parts(self, turns: Turns, timing: Timing, tell: Listener) -> Generator[tuple[Turn, Part], None, None]:
         """Yields each turn with its part as soon as it has ended; what a case does is a row, not an error.
 
         turns : asked for the next turn when there is room for it, so that a turn may depend on those that have ended.

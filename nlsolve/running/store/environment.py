@@ -8,7 +8,6 @@ from __future__ import annotations
 import json
 import os
 import platform
-import subprocess
 from collections.abc import Mapping
 from functools import cache
 from importlib.metadata import PackageNotFoundError, entry_points, version
@@ -17,11 +16,9 @@ from pathlib import Path
 from threadpoolctl import threadpool_info
 
 from nlsolve.registry.hookspecs import PROJECT
-from nlsolve.running.store.sources import fingerprint, numerics
+from nlsolve.running.store.sources import LETTERS, fingerprint, numerics
 
 LIBRARIES = (PROJECT, "numpy", "scipy", "pandas", "pydantic")
-
-SECONDS_FOR_GIT = 5.0
 
 
 @cache
@@ -58,18 +55,24 @@ def _version(name: str) -> str:
 
 
 def _commit(folder: Path) -> str:
-    """The commit of a checkout, with a + where files have changed since; "none" for an installed package."""
-    if not (folder / ".git").exists():
+    """The commit of a checkout, read without a process, whose work would count as the case's; "none" for a package."""
+    git = folder / ".git"
+    if not git.exists():
         return "none"
-    git = ("git", "-C", str(folder))
     try:
-        told = [
-            subprocess.run([*git, *words], capture_output=True, text=True, timeout=SECONDS_FOR_GIT, check=True).stdout
-            for words in (("rev-parse", "--short=12", "HEAD"), ("status", "--porcelain", "--untracked-files=no"))
-        ]
-    except (OSError, subprocess.SubprocessError):  # no git here, or a checkout it refuses
+        if git.is_file():  # a worktree
+            git = folder / git.read_text(encoding="utf-8").partition(":")[2].strip()
+        _, is_branch, name = (git / "HEAD").read_text(encoding="utf-8").strip().rpartition("ref: ")
+        if not is_branch:
+            return name[:LETTERS]
+        shared = git / "commondir"
+        home = git / shared.read_text(encoding="utf-8").strip() if shared.is_file() else git
+        if (home / name).is_file():
+            return (home / name).read_text(encoding="utf-8")[:LETTERS]
+        packed = (home / "packed-refs").read_text(encoding="utf-8").splitlines()
+        return next((line[:LETTERS] for line in packed if line.endswith(f" {name}")), "unknown")
+    except OSError:
         return "unknown"
-    return told[0].strip() + ("+" if told[1].strip() else "")
 
 
 def _processor() -> str:

@@ -25,7 +25,7 @@ from nlsolve.study.study import Study
 @pytest.fixture(autouse=True)
 def fake(monkeypatch, tmp_path):
     monkeypatch.setattr("nlsolve.study.study.load_registry", registry_of)
-    monkeypatch.setattr("nlsolve.running.runner.run_case", fake_march)
+    monkeypatch.setattr("nlsolve.running.engines.execution.run_case", fake_march)
     monkeypatch.chdir(tmp_path)
 
 
@@ -211,7 +211,7 @@ def test_an_export_has_the_files_that_the_study_reads(monkeypatch, tmp_path):
     """Those whose names lead out of the folder are told."""
     monkeypatch.undo()
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("nlsolve.running.runner.run_case", fake_march)
+    monkeypatch.setattr("nlsolve.running.engines.execution.run_case", fake_march)
     Path("nodes").mkdir()
     Path("nodes/a.csv").write_text("x,y,group\n")
     Path("b.csv").write_text("x,y,group\n")
