@@ -30,9 +30,9 @@ HANGING = ("loops", "deaf", "stuck")
 BY_KIND = {cls.kind_name(): cls for cls in OFFERED}
 ENDINGS = {
     "sound": ("converged", None, "the stopping test was met"),
-    "loops": ("timed out", None, r"limits.seconds = 3 at FILE:\d+ \(solver 'loops'\)"),
-    "deaf": ("timed out", None, r"limits.seconds = 3 at "),
-    "stuck": ("timed out", None, r"limits.seconds = 3 at FILE:\d+ \(solver 'stuck'\)"),
+    "loops": ("timed out", None, r"limits.seconds = 5 at FILE:\d+ \(solver 'loops'\)"),
+    "deaf": ("timed out", None, r"limits.seconds = 5 at "),
+    "stuck": ("timed out", None, r"limits.seconds = 5 at FILE:\d+ \(solver 'stuck'\)"),
     "yields-forever": ("stagnated", None, "the residual stopped falling"),
     "leaks": ("out of memory", None, r"at FILE:\d+ \(solver 'leaks'\)"),
     "asks-for-too-much": ("out of memory", None, r"MemoryError: Unable to allocate 72\.8 TiB"),
@@ -56,7 +56,7 @@ ENDINGS = {
 
 def document(*solvers: NonlinearSolver | dict[str, Any], **sections: Any) -> dict[str, Any]:
     """A study of one small system under these solvers."""
-    seconds = [3.0 if isinstance(solver, Planted) and solver.kind_name() in HANGING else 120.0 for solver in solvers]
+    seconds = [5.0 if isinstance(solver, Planted) and solver.kind_name() in HANGING else 120.0 for solver in solvers]
     return {
         "question": "What does a plugin cost?",
         "scene": {"kind": "published", "problem": "powell-singular"},

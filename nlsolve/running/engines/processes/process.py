@@ -16,6 +16,8 @@ from typing import Any
 
 import psutil
 
+from nlsolve.registry.probing import environment_of_faults
+
 BOOT = (
     "import json, sys; argument = json.loads(sys.argv.pop()); sys.path[:] = argument['path']; "
     "from nlsolve.running.engines.processes.worker import main; main(*argument['main'])"
@@ -66,7 +68,7 @@ class WorkerProcess:
             stdin=subprocess.DEVNULL,
             stdout=written,
             stderr=written,
-            env={**os.environ, **ONE_THREAD},
+            env={**os.environ, **ONE_THREAD, **environment_of_faults()},
             pass_fds=(theirs.fileno(), self._faults.fileno()),
             start_new_session=True,
         )
