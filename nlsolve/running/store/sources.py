@@ -54,8 +54,9 @@ def sources_of(cls: type) -> dict[str, str]:
         top = base.__module__.partition(".")[0]
         if top == PROJECT:
             found[PROJECT] = numerics()
-        elif top not in NOT_COUNTED and top not in found:
-            found[top] = f"{_versions().get(top, '')} {_package(top, base)}".strip()
+        elif top not in NOT_COUNTED:
+            name, source = _package(top, base)
+            found[name] = f"{_versions().get(top, '')} {source}".strip()
     return found
 
 
@@ -71,15 +72,16 @@ def source_of(names: tuple[str, ...]) -> str:
     return _of_files(home, (path for name in names for path in _files(home / name)))
 
 
-def _package(top: str, cls: type) -> str:
+def _package(top: str, cls: type) -> tuple[str, str]:
+    """Name and fingerprint of the package or file of a class; a file imported by another name has its own."""
     module = sys.modules.get(top)
     places = getattr(module, "__path__", None)
     if places:
-        return fingerprint("".join(_of_files(Path(place), _files(Path(place))) for place in sorted(places)).encode())
+        return top, fingerprint("".join(_of_files(Path(at), _files(Path(at))) for at in sorted(places)).encode())
     file = _file(sys.modules.get(cls.__module__), cls)
     if file is not None:
-        return fingerprint(file.read_bytes())
-    return fingerprint("".join(_code(method.__code__) for method in _methods(cls)).encode())
+        return top if file.stem == top else file.name, fingerprint(file.read_bytes())
+    return top, fingerprint("".join(_code(method.__code__) for method in _methods(cls)).encode())
 
 
 def _file(module: ModuleType | None, cls: type) -> Path | None:

@@ -25,6 +25,8 @@ from nlsolve.results.columns import RUNS
 from nlsolve.running.engines.processes import process
 from nlsolve.running.engines.processes.process import BOOT, END_OF_OUTPUT
 from nlsolve.running.runner import run
+from nlsolve.running.store.identity import case_of
+from nlsolve.running.store.reading import output_file
 
 HANGING = ("loops", "deaf", "stuck")
 BY_KIND = {cls.kind_name(): cls for cls in OFFERED}
@@ -70,7 +72,8 @@ def outputs(results: Results) -> dict[str, str]:
     """What each case has printed, by its solver."""
     assert results.folder is not None
     files = {run["case"]: run["solver.kind"] for _, run in results.runs.iterrows()}
-    return {files[path.stem]: path.read_text(encoding="utf-8") for path in (results.folder / "cases").glob("*.txt")}
+    paths = (results.folder / "cases").glob("*.txt")
+    return {files[case_of(path.stem)]: path.read_text(encoding="utf-8") for path in paths}
 
 
 def workers() -> set[int]:
@@ -155,7 +158,9 @@ def test_a_worker_serves_until_a_case_has_changed_it(tmp_path):
     results = run(document(*solvers), tmp_path, isolation="process", jobs=1)
     told = {}
     for _, row in results.runs[results.runs["solver.kind"] == "tells"].iterrows():
-        lines = (tmp_path / "cases" / f"{row['case']}.txt").read_text().splitlines()
+        file = output_file(tmp_path, row["case"])
+        assert file is not None
+        lines = file.read_text().splitlines()
         told[row["solver.number"]] = lines[0].split()
     numbers = [told[number][0] for number in (1, 2, 3, 4)]
     assert numbers[0] == numbers[1]

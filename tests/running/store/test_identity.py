@@ -125,6 +125,14 @@ def test_a_class_typed_at_a_prompt_counts_by_its_methods():
     assert typed(LAW) != typed(LAW.replace("2.0", "3.0"))
 
 
+def test_a_file_that_is_loaded_under_another_name_has_its_own(tmp_path):
+    """As a study's `plugins = ["./my_law.py"]` may do, with a name that follows from the text."""
+    (tmp_path / "my_law.py").write_text(LAW, encoding="utf-8")
+    names: dict = {"__name__": "loaded_under_another_name"}
+    exec(compile(LAW, str(tmp_path / "my_law.py"), "exec"), names)
+    assert set(sources_of(names["Syrup"])) == {"my_law.py", "nlsolve"}
+
+
 def test_a_version_counts(importable, monkeypatch):
     monkeypatch.setattr(sources, "_versions", lambda: {"syrup_versioned": "1.0"})
     before = sources_of(importable("syrup_versioned", alone=LAW).Syrup)
