@@ -8,6 +8,7 @@ import signal
 import subprocess
 import sys
 import time
+from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 from typing import Any, ClassVar, Literal
 
@@ -227,6 +228,21 @@ def test_components_that_a_worker_cannot_import_run_here(monkeypatch):
     assert OfThisScript.processes == [os.getpid()]
     (note,) = results.notes
     assert "the section 'solver' cannot be imported by another process (ModuleNotFoundError" in note
+
+
+def test_a_plugin_of_one_file_goes_along(tmp_path):
+    """Its module has a name under which nobody finds it."""
+    source = Path(planted.__file__).read_text(encoding="utf-8")
+    (tmp_path / "mine.py").write_text(source.replace('"tells"', '"mine"'))
+    spec = spec_from_file_location("a_file_of_mine", tmp_path / "mine.py")
+    assert spec is not None
+    assert spec.loader is not None
+    module = sys.modules[spec.name] = module_from_spec(spec)
+    spec.loader.exec_module(module)
+    results = run(document(module.Tells()), tmp_path / "out", isolation="process")
+    del sys.modules[spec.name]
+    assert results.notes == ()
+    assert not outputs(results)["mine"].startswith(str(os.getpid()))
 
 
 def test_an_interruption_stops_all_workers_and_keeps_what_is_finished(tmp_path):

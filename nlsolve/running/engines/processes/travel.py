@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import io
 import pickle
+import sys
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from importlib.util import find_spec, module_from_spec, spec_from_file_location
 from types import SimpleNamespace
 from typing import Any
 
 from nlsolve.contracts.component import Component
 from nlsolve.results.frames import Part
-from nlsolve.running.engines.places import named
+from nlsolve.running.engines.places import components_in, named
 from nlsolve.study.case import Case
 from nlsolve.study.limits import Limits
 from nlsolve.study.timing import Timing
@@ -33,16 +35,20 @@ class Task:
     """A case on its way to a worker.
 
     sections : each component, pickled by itself, so that the one that fails can be named.
+    files : module -> its file, for the modules of the components, which need not be installed.
     """
 
     case: str
     parameters: Mapping[str, Any]
     sections: Mapping[str, bytes]
+    files: Mapping[str, str]
     limits: Limits
     timing: Timing
 
     def parts(self) -> Sections:
         """The components of the case. Raises NotPortable for one that this process cannot import."""
+        for module, file in self.files.items():
+            _load(module, file)
         return Sections(**{name: _unpacked(name, data) for name, data in self.sections.items()})
 
 
@@ -77,7 +83,10 @@ class Unreadable:
 def packed(case: Case, timing: Timing) -> Task:
     """The task of a case. Raises NotPortable when a component cannot be pickled, or is of the running script's own."""
     sections = {name: _packed(name, value) for name, value in case.parts}
-    return Task(case.id, dict(case.parameters), sections, case.parts.limits, timing)
+    modules = {type(component).__module__ for component in components_in(value for _, value in case.parts)}
+    files = {name: getattr(sys.modules.get(name), "__file__", None) for name in sorted(modules)}
+    known = {name: file for name, file in files.items() if file is not None}
+    return Task(case.id, dict(case.parameters), sections, known, case.parts.limits, timing)
 
 
 class _Pickler(pickle.Pickler):
@@ -97,6 +106,27 @@ def _packed(name: str, value: Any) -> bytes:
         words = named(value) if isinstance(value, Component) and value.noun == name else f"the section {name!r}"
         raise NotPortable(f"{words} cannot go to another process ({error})") from error
     return data.getvalue()
+
+
+def _load(module: str, file: str) -> None:
+    """Import a module from its file where it cannot be found by its name: a plugin of one file, or a test."""
+    if module in sys.modules or _can_be_found(module):
+        return
+    spec = spec_from_file_location(module, file)
+    if spec is None or spec.loader is None:
+        return
+    sys.modules[module] = module_from_spec(spec)
+    try:
+        spec.loader.exec_module(sys.modules[module])
+    except Exception:  # is met again, and told, where a component of the module is made
+        del sys.modules[module]
+
+
+def _can_be_found(module: str) -> bool:
+    try:
+        return find_spec(module) is not None
+    except (ImportError, ValueError):
+        return False
 
 
 def _unpacked(name: str, data: bytes) -> Any:
