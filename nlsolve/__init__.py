@@ -15,8 +15,8 @@ if TYPE_CHECKING:
     from nlsolve.registry.problems import StudyError
     from nlsolve.running.interactive import compare, solve
     from nlsolve.running.march import March, march
-    from nlsolve.running.runner import Event, Results, run
-    from nlsolve.running.store import StoreError
+    from nlsolve.running.runner import Event, Results, load, run
+    from nlsolve.running.store.parts import StoreError
     from nlsolve.solving.simulate import Progress
     from nlsolve.study.study import Study
 
@@ -33,11 +33,12 @@ _HOME = {
     "Results": "nlsolve.running.runner",
     "SolveError": "nlsolve.contracts.status",
     "Status": "nlsolve.contracts.status",
-    "StoreError": "nlsolve.running.store",
+    "StoreError": "nlsolve.running.store.parts",
     "Study": "nlsolve.study.study",
     "StudyError": "nlsolve.registry.problems",
     "March": "nlsolve.running.march",
     "compare": "nlsolve.running.interactive",
+    "load": "nlsolve.running.runner",
     "march": "nlsolve.running.march",
     "run": "nlsolve.running.runner",
     "solve": "nlsolve.running.interactive",
@@ -57,6 +58,7 @@ __all__ = [
     "StudyError",
     "__version__",
     "compare",
+    "load",
     "march",
     "run",
     "solve",

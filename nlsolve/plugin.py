@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from nlsolve.algebra.system import System
-from nlsolve.contracts.component import Component
+from nlsolve.contracts.component import Component, InputFile
 from nlsolve.contracts.continuum.cloud import Cloud, Exact
 from nlsolve.contracts.continuum.discretizer import Discretizer, Operators, PointOperators
 from nlsolve.contracts.continuum.law import ConstitutiveLaw, PowerForm, local_index, stress
@@ -43,6 +43,7 @@ __all__ = [
     "Globalization",
     "Globalized",
     "HomotopyForm",
+    "InputFile",
     "IterationOperator",
     "KeptTangent",
     "LinearSolver",

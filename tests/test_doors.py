@@ -20,6 +20,7 @@ CONVERTED = {
     "Invalid": "StudyError",
     "_Refused": "StudyError",
     "FigureError": "a note of `Results`",
+    "NotPortable": "a note of `Results`",
 }
 """Exceptions inside the house that no user sees, and what becomes of them."""
 

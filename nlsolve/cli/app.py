@@ -1,20 +1,19 @@
-"""The commands of the command line: run, validate, plan, diagnose, plugins, table."""
+"""The commands on studies: run, validate, plan, diagnose; and the list of plugins."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import asdict
-from enum import IntEnum
 from importlib.metadata import version
-from pathlib import Path
 from typing import Annotated
 
 import typer
 from pydantic_core import to_jsonable_python
 from rich.console import Console
 
+from nlsolve.cli.endings import ExitCode, ending
+from nlsolve.cli.folders import folders
+from nlsolve.cli.options import Json, Out, Quick, Settings, StudyFile, default_folder
 from nlsolve.cli.printing import (
     count,
     left_out,
@@ -23,41 +22,24 @@ from nlsolve.cli.printing import (
     print_results,
     say,
     say_endings,
-    stdout,
 )
 from nlsolve.cli.progress import Watch
+from nlsolve.contracts.status import Status
 from nlsolve.registry.problems import StudyError, did_you_mean
 from nlsolve.registry.registry import load_registry
 from nlsolve.results.frames import json_rows
 from nlsolve.running.diagnose import diagnose as diagnostics_of
 from nlsolve.running.forecast import ASSUMPTION, forecast
 from nlsolve.running.runner import run as run_study
-from nlsolve.running.store import StoreError, read_tables
-from nlsolve.show.tables import build
+from nlsolve.running.store.parts import Parts
+from nlsolve.running.store.standing import KEPT, standings_of
 from nlsolve.study.case import section_rows
 from nlsolve.study.study import Study
 from nlsolve.study.sweeps import parse_assignments
 
-
-class ExitCode(IntEnum):
-    """The exit codes of the commands."""
-
-    COMPLETE = 0
-    CRASHED = 1
-    INVALID = 2
-    INTERRUPTED = 130
-
-
 app = typer.Typer(
     help="Compare nonlinear solution strategies on equal terms.", no_args_is_help=True, pretty_exceptions_enable=False
 )
-
-StudyFile = Annotated[Path, typer.Argument(metavar="STUDY", help="a study file (TOML)")]
-Settings = Annotated[
-    list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="set a parameter, such as solver.order=20")
-]
-Quick = Annotated[bool, typer.Option("--quick", help="the shrunk study of the file's [quick] section")]
-Json = Annotated[bool, typer.Option("--json", help="machine-readable output")]
 
 
 @app.callback()
@@ -79,20 +61,38 @@ def show_version(asked: bool) -> None:
 @app.command()
 def run(
     study: StudyFile,
-    out: Annotated[
-        Path | None, typer.Option(help="results folder; default: results/NAME or results/NAME-quick")
-    ] = None,
+    out: Out = None,
     settings: Settings = None,
     quick: Quick = False,
     as_json: Json = False,
+    jobs: Annotated[
+        int | None,
+        typer.Option(help="cases at a time; default: the physical cores, but 1 for a study that says how it is timed"),
+    ] = None,
+    isolation: Annotated[
+        str | None,
+        typer.Option(metavar="HOW", help="process: each case in a worker process, the default; none: all in this one"),
+    ] = None,
+    pdb: Annotated[bool, typer.Option("--pdb", help="debug an error where it is raised; no isolation")] = False,
+    retry: Annotated[
+        list[str] | None, typer.Option(metavar="STATUS", help="run finished cases of this status again")
+    ] = None,
 ) -> None:
     """Run a study, or the part of it that is not yet in the results folder."""
-    folder = out or Path("results") / (study.stem + ("-quick" if quick else ""))
+    folder = out or default_folder(study, quick)
     console = Console(stderr=True)
     with ending(folder):
         checked = Study.from_toml(study, parse_assignments(settings or []), quick)
         with Watch(console) as watch:
-            results = run_study(checked, folder, listen=watch)
+            results = run_study(
+                checked,
+                folder,
+                listen=watch,
+                isolation=isolation,
+                jobs=jobs,
+                retry=statuses(retry or []),
+                debugger=watch.debug if pdb else None,
+            )
     print_results(results, as_json)
     for line in (*left_out(results.runs), *results.notes):
         say(line)
@@ -118,18 +118,26 @@ def validate(study: StudyFile, settings: Settings = None, as_json: Json = False)
 
 
 @app.command()
-def plan(study: StudyFile, settings: Settings = None, quick: Quick = False, as_json: Json = False) -> None:
-    """List the cases of a study and forecast what they cost."""
+def plan(
+    study: StudyFile, out: Out = None, settings: Settings = None, quick: Quick = False, as_json: Json = False
+) -> None:
+    """List the cases of a study, which of them are to be run and why, and forecast what they cost."""
+    folder = out or default_folder(study, quick)
     with ending():
         checked = Study.from_toml(study, parse_assignments(settings or []), quick)
+        words = standings_of(Parts(folder), checked)
         frame = forecast(checked)
+    frame.insert(1, "plan", frame["case"].map(words))
     if as_json:
-        typer.echo(json.dumps({"assumption": ASSUMPTION, "cases": json_rows(frame)}))
+        typer.echo(json.dumps({"assumption": ASSUMPTION, "folder": str(folder), "cases": json_rows(frame)}))
         return
     swept = list(dict.fromkeys(name for case in checked.cases for name in case.swept))
     sizes = ["increments", "nodes", "unknowns", "seconds_factorization", "seconds_start", "seconds", "seconds_all"]
-    print_frame(count(len(frame)), frame[["case", *swept, *sizes]])
-    typer.echo(f"{frame['seconds_all'].sum() * checked.timing.rounds:.3g} s in all ({ASSUMPTION})")
+    print_frame(count(len(frame)), frame[["case", "plan", *swept, *sizes]])
+    left = frame[frame["plan"] != KEPT]
+    told = ", ".join(f"{number} {word}" for word, number in frame["plan"].value_counts().items())
+    typer.echo(f"{told} (results in {folder})")
+    typer.echo(f"{left['seconds_all'].sum() * checked.timing.rounds:.3g} s to run {count(len(left))} ({ASSUMPTION})")
 
 
 @app.command()
@@ -154,36 +162,13 @@ def plugins(as_json: Json = False) -> None:
     print_plugins(rows)
 
 
-@app.command()
-def table(
-    folder: Annotated[Path, typer.Argument(metavar="DIR", help="a results folder")],
-    name: Annotated[str | None, typer.Argument(help="one declared table; default: all")] = None,
-    as_json: Json = False,
-) -> None:
-    """Print the declared tables of a results folder."""
-    with ending():
-        specs, runs = read_tables(folder)
-        names = [spec.name for spec in specs]
-        if name is not None and name not in names:
-            raise StudyError(f"{folder}: there is no table {name!r}; {did_you_mean(name, names)}")
-        tables = [build(spec, runs) for spec in specs if name in (None, spec.name)]
-    if as_json:
-        typer.echo(json.dumps({table.spec.name: table.long() for table in tables}))
-        return
-    for declared in tables:
-        for printed in declared.rich():
-            stdout().print(printed)
+def statuses(words: list[str]) -> list[Status]:
+    """The statuses of --retry. Raises StudyError for a word that is none."""
+    known = [status.word for status in Status]
+    for word in words:
+        if word not in known:
+            raise StudyError(f"--retry {word!r}: no such status; {did_you_mean(word, known)}")
+    return [Status.of(word) for word in words]
 
 
-@contextmanager
-def ending(folder: Path | None = None) -> Iterator[None]:
-    """Turn invalid input and an interruption into a sentence on standard error and an exit code."""
-    try:
-        yield
-    except (StudyError, StoreError) as error:
-        say(str(error))
-        raise typer.Exit(ExitCode.INVALID) from error
-    except KeyboardInterrupt as error:
-        kept = f"; the finished cases are in {folder} and the same command does the rest" if folder else ""
-        say(f"interrupted{kept}")
-        raise typer.Exit(ExitCode.INTERRUPTED) from error
+app.add_typer(folders)

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
+from typing import Any
 
 import pandas as pd
 import typer
@@ -13,8 +15,11 @@ from rich.table import Table as RichTable
 from nlsolve.contracts.status import Status
 from nlsolve.flow.validity import LIMITS
 from nlsolve.registry.registry import PluginRow
-from nlsolve.results.frames import json_rows
+from nlsolve.results.frames import json_rows, rows_of
+from nlsolve.results.verdicts import status_of
+from nlsolve.running.retry import is_final
 from nlsolve.running.runner import Results
+from nlsolve.running.store.reading import output_file
 
 UNFOLDED = 400
 """Characters a line may have in a file or a pipe."""
@@ -77,13 +82,23 @@ def say_endings(results: Results) -> None:
     runs = results.runs
     endings = ", ".join(f"{number} {word}" for word, number in runs["status"].value_counts().items())
     say(f"{count(len(runs))}: {endings}; results in {results.folder}")
-    firsts = {Status.of(run["status"]): run for _, run in runs.drop_duplicates("status").iterrows()}
+    firsts = {status_of(run): run for run in rows_of(runs.drop_duplicates("status"))}
     firsts.pop(Status.CONVERGED, None)
     crash = firsts.pop(Status.CRASHED, None)
     for status, run in firsts.items():
-        say(f"case {run['case']} ended as {status.word}: {run['message']}")
+        say(f"case {run['case']} ended as {status.word}: {run['message']}{_printed(results, run)}")
     if crash is not None:
-        say(f"case {crash['case']} crashed: {crash['message']}")
+        say(f"case {crash['case']} crashed: {crash['message']}{_printed(results, crash)}")
+    kept = sorted({run["status"] for run in rows_of(runs) if is_final(run)})
+    if kept:
+        options = " ".join(f"--retry {word!r}" for word in kept)
+        say(f"what was stopped at a limit is run again when the limit is raised, and all of these with {options}")
+
+
+def _printed(results: Results, run: Mapping[str, Any]) -> str:
+    """Where a case's output is; empty when it has printed nothing."""
+    file = None if results.folder is None else output_file(results.folder, run["case"])
+    return "" if file is None else f"; what it printed is in {file}"
 
 
 def left_out(runs: pd.DataFrame) -> list[str]:

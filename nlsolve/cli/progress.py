@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pdb
 import time
 from types import TracebackType
 from typing import Self
@@ -21,7 +22,8 @@ class Watch:
     def __init__(self, console: Console) -> None:
         self.console = console
         self.factorizations = 0
-        self.read_back = 0
+        self.read_back = self.ended = 0
+        self.running: dict[int, float] = {}
         self.begun = self.told = time.monotonic()
         columns = (BarColumn(8), TextColumn("{task.description}", markup=False))
         self.bar = Progress(*columns, console=console, disable=not console.is_terminal)
@@ -37,19 +39,33 @@ class Watch:
         self.bar.stop()
 
     def __call__(self, event: Event) -> None:
-        """Show an event."""
+        """Show an event; cases may run side by side."""
         now = event.progress
-        part = 1.0 if event.run is not None else now.increment / now.increments if now is not None else 0.0
+        if event.run is None:
+            self.running[event.number] = now.increment / now.increments if now is not None else 0.0
+        else:
+            self.running.pop(event.number, None)
+            self.ended += 1
         if event.resumed:
-            self.read_back, self.begun = event.number, time.monotonic()
+            self.read_back += 1
+            if self.read_back == self.ended:
+                self.begun = time.monotonic()
         elif event.run is not None:
             self.factorizations += int(event.run.get("factorizations", 0))
-        words = self.words(event, event.number - 1 + part)
-        self.bar.update(self.task, description=words, total=event.cases, completed=event.number - 1 + part)
+        done = self.ended + sum(self.running.values())
+        words = self.words(event, done)
+        self.bar.update(self.task, description=words, total=event.cases, completed=done)
         due = event.run is not None or time.monotonic() - self.told > SECONDS_BETWEEN_LINES
         if due and not self.console.is_terminal:
             self.told = time.monotonic()
             self.console.print(words, markup=False, highlight=False, soft_wrap=True)
+
+    def debug(self, error: BaseException) -> None:
+        """Take the bar down and debug an error where it was raised."""
+        self.bar.stop()
+        self.console.print(f"{type(error).__name__}: {error}", markup=False, highlight=False)
+        pdb.post_mortem(error.__traceback__)
+        self.bar.start()
 
     def words(self, event: Event, done: float) -> str:
         """case 3/16, increment 12/1250, tangent 3, 17 factorisations, 140 s left (solver.order = 20)

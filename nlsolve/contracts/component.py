@@ -2,9 +2,22 @@
 
 from __future__ import annotations
 
-from typing import Any, ClassVar, Self
+from dataclasses import dataclass
+from typing import Annotated, Any, ClassVar, Self
 
 from pydantic import BaseModel, ConfigDict
+
+
+@dataclass(frozen=True)
+class NamesAFile:
+    """Marks a field that names a file."""
+
+
+NAMES_A_FILE = NamesAFile()
+
+InputFile = Annotated[str, NAMES_A_FILE]
+"""The type of a field that names a file which the component reads. Its contents are part of what tells cases apart: a
+case is run again when they have changed. A field of type `pathlib.Path` counts too."""
 
 
 class Component(BaseModel):

@@ -22,6 +22,8 @@ class Status(Enum):
     ILL_CONDITIONED = "the local systems of the discretisation are singular to working precision"
     NOT_APPLICABLE = "the method does not apply to this problem"
     CRASHED = "the case stopped on an error in the program or in a plugin"
+    TIMED_OUT = "the case was stopped because it took more seconds than its limit"
+    OUT_OF_MEMORY = "the case was stopped because it held more memory than its limit, or than there is"
 
     @property
     def word(self) -> str:
@@ -42,6 +44,10 @@ class Status(Enum):
         return self.value
 
 
+STOPPED = frozenset({Status.TIMED_OUT, Status.OUT_OF_MEMORY})
+"""Statuses of cases that were stopped at a limit."""
+
+
 class InputError(ValueError):
     """A mistake of the caller: one sentence that names the place, the value there, and the way out."""
 
@@ -55,4 +61,16 @@ class SolveError(Exception):
 
     def __init__(self, status: Status, detail: str = "") -> None:
         super().__init__(detail or status.sentence)
+        self.status, self.detail = status, detail
+
+
+class CaseStopped(BaseException):
+    """A case has reached one of its limits. Raised wherever the case is; no plugin catches it with its other errors.
+
+    status : which limit.
+    detail : a sentence with the limit and the place.
+    """
+
+    def __init__(self, status: Status, detail: str) -> None:
+        super().__init__(detail)
         self.status, self.detail = status, detail

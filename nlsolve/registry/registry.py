@@ -33,6 +33,7 @@ from nlsolve.contracts.rules.refresh import RefreshRule
 from nlsolve.contracts.scene import Scene
 from nlsolve.registry import hookspecs
 from nlsolve.registry.component_tables import ComponentTable, own_class
+from nlsolve.registry.probing import faults_of, undisturbed
 
 CONTRACTS: dict[str, type[Component]] = {
     contract.noun: contract
@@ -101,16 +102,22 @@ class Registry:
     def installed(cls) -> Registry:
         """A registry of all plugins in the entry-point group, loaded in the order of their names."""
         registry = cls()
-        for entry in sorted(entry_points(group=hookspecs.PROJECT), key=lambda entry: (entry.name, entry.value)):
-            registry.load(entry)
+        entries = sorted(entry_points(group=hookspecs.PROJECT), key=lambda entry: (entry.name, entry.value))
+        faults = faults_of([entry for entry in entries if not _is_own(entry)])
+        for entry in entries:
+            if entry.value in faults:
+                registry._fail(_source(entry), f"the plugin {entry.name!r} cannot be imported: {faults[entry.value]}")
+            else:
+                registry.load(entry)
         return registry
 
     def load(self, entry: EntryPoint) -> None:
         """Import the plugin of one entry point and register it; a failure becomes a row."""
-        source = f"{entry.dist.name} {entry.dist.version} ({entry.value})" if entry.dist else entry.value
+        source = _source(entry)
         try:
-            plugin = entry.load()
-        except Exception as error:  # a stranger's import may raise anything; the rest must still work
+            with undisturbed():
+                plugin = entry.load()
+        except (Exception, SystemExit) as error:  # a stranger's import may raise anything; the rest must still work
             self._fail(source, f"the plugin {entry.name!r} cannot be imported: {_sentence(error)}")
         else:
             self.add(plugin, source)
@@ -263,6 +270,16 @@ class Registry:
 def load_registry() -> Registry:
     """The registry of the installed plugins, loaded at the first call in a process."""
     return Registry.installed()
+
+
+def _source(entry: EntryPoint) -> str:
+    """Distribution, version and module of an entry point."""
+    return f"{entry.dist.name} {entry.dist.version} ({entry.value})" if entry.dist else entry.value
+
+
+def _is_own(entry: EntryPoint) -> bool:
+    """Whether a plugin ships with nlsolve."""
+    return entry.dist is not None and entry.dist.name == hookspecs.PROJECT
 
 
 def _checked(cls: Any) -> type[Component]:

@@ -44,6 +44,11 @@ RUNS = _by_name(
     Column("status", "how the case ended, in a word or two"),
     Column("message", "how the case ended, in a sentence"),
     Column(
+        "interpreter",
+        "what a crashed case did to the interpreter: SIGSEGV or another signal, exit code 3, SystemExit, "
+        "KeyboardInterrupt; it is run again only with --retry",
+    ),
+    Column(
         "false_convergence",
         "solves in which the method, or a stopping test other than that of residuals, said converged of a state whose "
         "residual says otherwise",
@@ -97,6 +102,7 @@ RUNS = _by_name(
     ),
     Column("rounds", "how often the case was timed; the seconds are those of its fastest round"),
     Column("clock", "clock of the seconds: wall, or processor, which does not count the time given to other programs"),
+    Column("environment", "where the case was computed: a name in the folder `environments` and in the report"),
     Column("unit.residual", "measured on the last problem of the case: seconds of one residual", "s"),
     Column("unit.expansion", "as unit.residual: beginning a series", "s"),
     Column("unit.jacobian", "as unit.residual: one Jacobian", "s"),
@@ -197,7 +203,11 @@ RUNS = _by_name(
     Column(
         "audit.heating", "largest adiabatic heating S:ε̇/(ρ c_p) over the time reached, or a time 2π/reference rate", "K"
     ),
-    Column("doubt", "what the audits, or a system's roots, put in doubt, and the way out; empty when nothing"),
+    Column(
+        "doubt",
+        "what the audits, a system's roots, or work in other processes put in doubt, and the way out; empty when "
+        "nothing",
+    ),
 )
 """`runs`: a row a case, whatever its ending. Behind these stand all parameters of the case, dotted ("solver.order")."""
 

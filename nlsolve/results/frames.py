@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import pandas as pd
@@ -21,6 +21,21 @@ class Frames:
     runs: pd.DataFrame
     steps: pd.DataFrame
     fields: pd.DataFrame
+
+
+@dataclass(frozen=True)
+class Part:
+    """The results of one case: its row of `runs`, its rows of `steps` and of `fields`.
+
+    environment : what it was computed with, such as versions and processor; its row has the digest of it.
+    output : what the case has printed, cut in the middle where it is long; empty where nobody has listened.
+    """
+
+    run: Row
+    steps: pd.DataFrame
+    fields: pd.DataFrame
+    environment: Mapping[str, str] = field(default_factory=dict)
+    output: str = ""
 
 
 def steps_frame(rows: Sequence[Mapping[str, Any]]) -> pd.DataFrame:

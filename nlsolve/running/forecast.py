@@ -40,7 +40,7 @@ SAMPLE = [
 ]
 """Columns that `costs_of` gives: sizes of a case and seconds [s] of its work."""
 
-METHOD = ("solver", "refresh", "operator", "predictor", "stop", "budget", "record")
+METHOD = ("solver", "refresh", "operator", "predictor", "stop", "budget", "record", "limits")
 """Sections that do not change what a unit of work costs."""
 
 

@@ -1,55 +1,33 @@
-"""Study -> results: every case is run once, on one thread, and every ending becomes a row."""
+"""Study -> results: an engine runs every case once, and every ending becomes a row."""
 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Collection, Mapping
+from contextlib import closing
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import pandas as pd
-from threadpoolctl import threadpool_limits
 
-from nlsolve.contracts.linear_solver import LinearSolver
-from nlsolve.contracts.status import SolveError, Status
+from nlsolve.contracts.status import STOPPED, Status
 from nlsolve.registry.problems import StudyError, did_you_mean
-from nlsolve.results.costs.cost_prediction import UNITS, with_predictions
-from nlsolve.results.frames import Frames
-from nlsolve.results.reference_error import with_reference_errors
-from nlsolve.results.verdicts import number
-from nlsolve.running.store import Part, Store, merge
-from nlsolve.running.timing import CLOCKS, measure
+from nlsolve.results.frames import Frames, Part, rows_of
+from nlsolve.running.engines.choice import engine_for
+from nlsolve.running.engines.engine import Event, Listener
+from nlsolve.running.engines.execution import Debugger
+from nlsolve.running.store.parts import Parts, StoreError, merge
+from nlsolve.running.store.reading import completed, description_of, environments_of, finished, of_one_source
+from nlsolve.running.store.store import Store
+from nlsolve.running.turns import Turns
 from nlsolve.show.figures import FigureError, draw, save
 from nlsolve.show.report import write_report
 from nlsolve.show.tables import Table, build
-from nlsolve.solving.simulate import Progress, Record, crashed, run_case
-from nlsolve.study.case import Case
 from nlsolve.study.study import Study
-from nlsolve.study.timing import Timing
-
-
-@dataclass(frozen=True)
-class Event:
-    """What a listener is told: a case begins (no `progress`, no `run`), advances (`progress`), or has ended (`run`).
-
-    number, cases : which case this is, from 1, and how many there are; with several timing rounds every round counts.
-    run : the row of `runs` of the case.
-    resumed : whether that row was read from the results folder instead of computed.
-    """
-
-    case: Case
-    number: int
-    cases: int
-    progress: Progress | None = None
-    run: Mapping[str, Any] | None = None
-    resumed: bool = False
-
 
 SECONDS_BETWEEN_FRAMES = 10.0
 """Least time between two writings of the merged frames [s]; the part of a case is saved as soon as the case ends."""
-
-Listener = Callable[[Event], None]
 
 
 @dataclass(frozen=True)
@@ -58,7 +36,8 @@ class Results:
 
     runs, steps, fields : tidy frames; `nlsolve.results.columns` says what every column means.
     folder : the results folder; None if the results are in memory only.
-    notes : one sentence for each table or figure that could not be shown, with the reason.
+    notes : one sentence for each table or figure that could not be shown, with the reason, and for each thing that was
+        done otherwise than asked.
     """
 
     study: Study
@@ -70,8 +49,8 @@ class Results:
 
     @property
     def crashed(self) -> int:
-        """How many cases stopped on an error in the program or in a plugin."""
-        return int((self.runs["status"] == Status.CRASHED.word).sum())
+        """How many cases stopped on an error in the program or in a plugin, or were stopped at a limit."""
+        return int(self.runs["status"].isin([status.word for status in (Status.CRASHED, *STOPPED)]).sum())
 
     def tables(self) -> list[Table]:
         """The declared tables that these runs can fill; the others are in `notes`."""
@@ -93,89 +72,76 @@ def run(
     overrides: Mapping[str, Any] | None = None,
     quick: bool = False,
     listen: Listener | None = None,
+    isolation: str | None = None,
+    jobs: int | None = None,
+    retry: Collection[Status] = (),
+    debugger: Debugger | None = None,
 ) -> Results:
     """Run every case of a study that has not been run before, and keep the results in `out` (None: in memory).
 
-    An interruption loses only the case that is running; the same call later runs the cases that are left. Cases that
-    crashed, or whose method did not apply, are run again. `listen` is called with each `Event`.
+    listen : is called with each `Event`.
+    isolation : "process": every case in a worker process, within its limits (the default); "none": in this process.
+    jobs : cases at a time; by default as many as there are physical cores, but one if the study says how it is timed.
+    retry : statuses of cases that are run again. Cases with an error of the program or of a plugin, and those whose
+        method did not apply, always are, and those stopped at a limit when it has been raised.
+    debugger : is called with an error before it becomes a row; the cases then run in this process.
 
-    Raises StudyError for a study that is not valid, StoreError for a folder that cannot hold its results.
+    An interruption loses only the cases that are running; the same call later runs those that are left.
+
+    Raises StudyError for a study that is not valid and for settings that do not go together, StoreError for a folder
+    that cannot hold its results.
     """
     study = study_of(study, overrides, quick)
-    store = None if out is None else Store(Path(out), study)
+    engine = engine_for(study.timing, isolation, jobs, debugger)
+    store = None if out is None else Store(Path(out), study, retry)
     tell = listen or (lambda event: None)
-    parts = _finished(study, store)
-    turns = [(turn, case) for turn in range(1, study.timing.rounds + 1) for case in study.cases]
+    if store is not None and (unchanged := store.unchanged()) is not None:
+        frames, notes = unchanged
+        for number, (case, row) in enumerate(zip(study.cases, rows_of(frames.runs), strict=True), 1):
+            tell(Event(case, number, len(study.cases), run=row, resumed=True))
+        return Results(study, frames.runs, frames.steps, frames.fields, store.folder, notes)
+    turns = Turns(study, store)
     written = time.monotonic()
     try:
-        for position, (turn, case) in enumerate(turns, 1):
-            begun = Event(case, position, len(turns))
-            resumed = case.id in parts and _rounds(parts[case.id], study.timing) >= turn
-            if not resumed:
-                tell(begun)
-                again = execute(case, position, len(turns), tell, study.timing)
-                parts[case.id] = _fastest(parts.get(case.id), again, study.timing)
-                if store is not None:
-                    store.save(parts[case.id])
-                    if time.monotonic() - written > SECONDS_BETWEEN_FRAMES:
-                        store.write_frames(_merged(study, parts))
-                        written = time.monotonic()
-            tell(Event(case, position, len(turns), run=parts[case.id].run, resumed=resumed))
+        with closing(engine.parts(turns.each(tell), study.timing, tell)) as ended:
+            for turn, again in ended:
+                part = turns.end(turn, again)
+                if store is not None and time.monotonic() - written > SECONDS_BETWEEN_FRAMES:
+                    store.write_frames(_merged(study, turns.parts))
+                    written = time.monotonic()
+                tell(turn.event(run=part.run))
     finally:
+        frames = _merged(study, turns.parts)
         if store is not None:
-            store.write_frames(_merged(study, parts))
-    frames = _merged(study, parts)
+            store.close()
+            store.write_frames(frames)
+    notes = tuple(engine.notes)
     if store is None:
-        return Results(study, frames.runs, frames.steps, frames.fields)
-    return Results(study, frames.runs, frames.steps, frames.fields, store.folder, _show(store, study, frames))
+        return Results(study, frames.runs, frames.steps, frames.fields, notes=notes)
+    notes += _show(store, study, frames)
+    store.mark_shown(notes)
+    return Results(study, frames.runs, frames.steps, frames.fields, store.folder, notes)
 
 
-def execute(case: Case, number: int, cases: int, tell: Listener, timing: Timing) -> Part:
-    """Run one case. Every exception becomes a row that says so; an interruption (KeyboardInterrupt) is passed on."""
-    try:
-        with threadpool_limits(limits=1):
-            clock = CLOCKS[timing.clock]
+def load(folder: str | Path) -> Results:
+    """The results in a folder, of whatever is finished of the study that it was last used for.
 
-            def listen(progress: Progress) -> None:
-                tell(Event(case, number, cases, progress=progress))
+    No study file is needed: the `study` of the results has tables, but no cases and no figures. Where the folder's
+    description of its study is damaged, all its cases are given that one source has computed.
 
-            record = run_case(case.parts, listen, clock)
-            units = unit_costs(record, case.parts.linear, clock) if timing.calibrate else {}
-    except Exception as error:  # the one boundary at which a crash turns into a result
-        summary: dict[str, Any] = crashed(error)
-        steps = fields = pd.DataFrame()
-    else:
-        timed = {"rounds": 1, "seconds_most": record.summary.get("seconds"), "clock": timing.clock}
-        summary, steps, fields = {**record.summary, **timed, **units}, record.steps, record.fields
-    row = {"case": case.id, **summary, **case.parameters}
-    return Part(row, _of_case(case.id, steps), _of_case(case.id, fields))
-
-
-def unit_costs(record: Record, linear: LinearSolver, clock: Callable[[], float]) -> dict[str, float]:
-    """Unit costs of the work on a case's last problem, as columns of `runs`; NaN if they cannot be measured."""
-    nothing = dict.fromkeys(UNITS, float("nan"))
-    if record.problem is None or record.state is None:
-        return nothing
-    try:
-        return measure(record.problem, linear, record.state, clock=clock).columns()
-    except SolveError:  # the last tangent cannot be factorised, which the status of the case tells
-        return nothing
-
-
-def _rounds(part: Part, timing: Timing) -> int:
-    """Number of rounds in which a case has been timed as the study asks; 0 for a case that crashed."""
-    known, units = number(part.run.get("rounds")), UNITS[0] in part.run or not timing.calibrate
-    return int(known) if known > 0 and units and part.run.get("clock") == timing.clock else 0
-
-
-def _fastest(before: Part | None, again: Part, timing: Timing) -> Part:
-    """The fastest timing round of a case. Its row also has the slowest round's seconds and the number of rounds."""
-    if before is None or not _rounds(before, timing) or not _rounds(again, timing):
-        return again
-    best = min(before, again, key=lambda part: part.run["seconds"])
-    most = max(part.run["seconds_most"] for part in (before, again))
-    rounds = _rounds(before, timing) + 1
-    return replace(best, run={**best.run, "seconds_most": most, "rounds": rounds})
+    Raises StoreError when there are none.
+    """
+    place = Path(folder)
+    Parts(place).refuse_old()
+    described = description_of(place)
+    planned = described.cases if described is not None else of_one_source(place)
+    frames = finished(place, planned)
+    if not len(frames.runs):
+        raise StoreError(f"{folder}: no finished cases can be read there")
+    study = Study(place.name, "", ()) if described is None else described.study()
+    left = len(planned) - len(frames.runs)
+    notes = (f"{len(frames.runs)} of {len(planned)} cases are finished",) if left else ()
+    return Results(study, frames.runs, frames.steps, frames.fields, place, notes)
 
 
 def study_of(study: Study | str | Path | Mapping[str, Any], overrides: Mapping[str, Any] | None, quick: bool) -> Study:
@@ -192,26 +158,10 @@ def study_of(study: Study | str | Path | Mapping[str, Any], overrides: Mapping[s
     return Study.from_toml(study, overrides, quick)
 
 
-def _finished(study: Study, store: Store | None) -> dict[str, Part]:
-    if store is None:
-        return {}
-    loaded = {case.id: store.load(case.id) for case in study.cases}
-    return {case: part for case, part in loaded.items() if part is not None}
-
-
 def _merged(study: Study, parts: Mapping[str, Part]) -> Frames:
     frames = merge([parts[case.id] for case in study.cases if case.id in parts])
     references = {case.id: case.reference for case in study.cases if case.reference}
-    frames = with_reference_errors(frames, references)
-    return replace(frames, runs=with_predictions(frames.runs))
-
-
-def _of_case(case: str, frame: pd.DataFrame) -> pd.DataFrame:
-    """The frame with a first column `case`; without rows, a frame without columns."""
-    if not len(frame):
-        return pd.DataFrame()
-    others = [name for name in frame.columns if name != "case"]
-    return frame.assign(case=case)[["case", *others]]
+    return completed(frames, references)
 
 
 def _tables(study: Study, runs: pd.DataFrame) -> tuple[list[Table], list[str]]:
@@ -239,5 +189,6 @@ def _show(store: Store, study: Study, frames: Frames) -> tuple[str, ...]:
             except FigureError as error:
                 notes.append(str(error))
         captions = [(spec.name, spec.caption) for spec in study.figures]
-        write_report(store.folder, study.question, shown, captions, frames.runs)
+        environments = environments_of(store.parts, frames.runs)
+        write_report(store.folder, study.question, shown, captions, frames.runs, environments)
     return tuple(notes)

@@ -28,11 +28,13 @@ def write_report(
     tables: Mapping[str, str | pd.DataFrame],
     figures: Sequence[tuple[str, str]],
     runs: pd.DataFrame,
+    environments: Mapping[str, Mapping[str, str]] | None = None,
 ) -> Path:
     """Write folder/report.html and return its path.
 
     tables : name -> DataFrame, or its HTML, which is trusted; everything else is escaped.
     figures : (name, caption); figures/NAME.png in the folder is linked, and a missing one is said to be missing.
+    environments : what rows were computed with, by its name in their column `environment`.
     """
     failed = runs[[status not in AT_A_SOLUTION for status in runs["status"].map(Status.of)]]
     parameters = differing_parameters(runs)
@@ -55,6 +57,8 @@ def write_report(
             for _, run in failed.iterrows()
         ],
         figures=[_figure(folder, name, caption) for name, caption in figures],
+        environments=environments or {},
+        rows_in=runs["environment"].value_counts() if "environment" in runs else {},
         facts=machine_facts(),
     )
     folder.mkdir(parents=True, exist_ok=True)

@@ -10,7 +10,7 @@ import numpy as np
 from nlsolve.contracts.nonlinear_solver import NonlinearSolver
 from nlsolve.contracts.outcome import Outcome
 from nlsolve.contracts.problem import NonlinearProblem
-from nlsolve.contracts.status import SolveError, Status
+from nlsolve.contracts.status import CaseStopped, SolveError, Status
 from nlsolve.results.columns import step_columns
 from nlsolve.series import Array
 from nlsolve.solving.counted_problem import CountedProblem
@@ -35,7 +35,8 @@ def solve(
     """Take steps of `solver` on `problem` from `start` (U,) until the stopping test, the budget or a failure ends them.
 
     After every step the driver measures ‖R_new‖/‖R_old‖ for the table of steps and for the refresh rule of `tangent`.
-    A SolveError of the method becomes the status of the outcome; any other error is raised.
+    A SolveError of the method becomes the status of the outcome, as does the limit at which the case is stopped; any
+    other error is raised.
     """
     counted = CountedProblem(problem, ledger, tangent.operator)
     begun, renewals, withheld = ledger.copy(), tangent.renewals, tangent.withheld
@@ -86,6 +87,8 @@ def solve(
         except SolveError as error:
             denied |= residual_norm <= stop.verified
             return ended(error.status, error.detail)
+        except CaseStopped as limit:
+            return ended(limit.status, limit.detail)
         if step is None:
             return ended(Status.STAGNATED, "the method stopped by itself before the stopping test was met")
         size_before, size = size, float(np.linalg.norm(counted.uncounted_residual(step.state)))

@@ -18,7 +18,7 @@ from nlsolve.contracts.problem import NonlinearProblem
 from nlsolve.contracts.rules.operator import IterationOperator
 from nlsolve.contracts.rules.refresh import RefreshRule
 from nlsolve.contracts.scene import Entry, Simulation, Solve
-from nlsolve.contracts.status import SolveError, Status
+from nlsolve.contracts.status import STOPPED, CaseStopped, SolveError, Status
 from nlsolve.results.columns import REPORTED, run_columns
 from nlsolve.results.frames import steps_frame
 from nlsolve.series import Array
@@ -178,10 +178,12 @@ class _Run:
             task = next(solves)
             while True:
                 outcome = self.prepared(task) if task.preparation is not None else self.solved(task)
+                if outcome.status in STOPPED:
+                    return outcome  # a simulation might try again
                 task = solves.send(outcome)
         except StopIteration as end:
             return end.value
-        except SolveError as error:
+        except (SolveError, CaseStopped) as error:
             return Outcome(error.status, error.detail, np.zeros(0), np.nan, ())
 
     def prepared(self, task: Solve) -> Outcome:
@@ -273,10 +275,11 @@ class _Run:
         }
 
 
-def crashed(error: Exception) -> dict[str, Any]:
+def crashed(error: BaseException) -> dict[str, Any]:
     """The row of `runs` for a case that an error of the program or of a plugin has ended: its message and its place."""
     place = traceback.extract_tb(error.__traceback__)[-1]
-    message = f"{type(error).__name__}: {error} ({place.filename}:{place.lineno})"
+    said = f"{type(error).__name__}: {error}" if str(error) else type(error).__name__
+    message = f"{said} ({place.filename}:{place.lineno})"
     return {"status": Status.CRASHED.word, "message": message}
 
 

@@ -22,6 +22,7 @@ from nlsolve.registry.problems import ABSENT, Problem, problems_in, unknown
 from nlsolve.registry.registry import CONTRACTS, PluginRow, Registry, parameters_of
 from nlsolve.results.parameters import names_settings
 from nlsolve.solving.stopping import Budget, StoppingTest
+from nlsolve.study.limits import Limits
 from nlsolve.study.sweeps import Document, Point, leaves
 
 COMMON: Mapping[str, Section] = {
@@ -31,6 +32,7 @@ COMMON: Mapping[str, Section] = {
     "operator": Section(IterationOperator),
     "stop": Section(StoppingTest),
     "budget": Section(Budget),
+    "limits": Section(Limits),
 }
 """The sections of every case, besides `scene` and those that the scene's class declares."""
 
@@ -41,7 +43,7 @@ DIGEST_LETTERS = 12
 class Case:
     """One case to be run.
 
-    id : digest of the validated components.
+    id : digest of the validated components; the limits belong to it where a sweep sets them.
     parts : the validated component of each section, under its name.
     parameters : every parameter under its dotted name ("solver.order"); lists as JSON text. Where a sweep has named
         settings, the names of this case's settings come first, under `variant` or the sweep's own `name`.
@@ -99,7 +101,9 @@ class Composer:
             value = getattr(getattr(parts, misfit.section), misfit.field)
             raise Invalid([Problem((misfit.section, misfit.field), _plain(value), misfit.expected)]) from misfit
         plain = self.plain(parts)
-        canonical = json.dumps(plain, sort_keys=True, separators=(",", ":"))
+        swept = {name.split(".")[0] for point in points for name in point.values}
+        telling = {name: section for name, section in plain.items() if name != Limits.noun or name in swept}
+        canonical = json.dumps(telling, sort_keys=True, separators=(",", ":"))
         digest = hashlib.sha256(canonical.encode()).hexdigest()[:DIGEST_LETTERS]
         chosen = {name: section for name, section in plain.items() if section is not None}  # None: it has no component
         return Case(digest, parts, *_parameters(chosen, points))

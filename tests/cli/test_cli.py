@@ -18,7 +18,7 @@ BARS = {"FORCE_COLOR": "1", "TERM": "xterm", "COLUMNS": "200"}
 def fake(monkeypatch, tmp_path):
     monkeypatch.setattr("nlsolve.study.study.load_registry", registry_of)
     monkeypatch.setattr("nlsolve.cli.app.load_registry", registry_of)
-    monkeypatch.setattr("nlsolve.running.runner.run_case", fake_march)
+    monkeypatch.setattr("nlsolve.running.engines.execution.run_case", fake_march)
     monkeypatch.chdir(tmp_path)
 
 
@@ -76,7 +76,7 @@ def test_divergence_is_a_result(tmp_path, monkeypatch):
         record.summary["status"] = "diverged"
         return record
 
-    monkeypatch.setattr("nlsolve.running.runner.run_case", march)
+    monkeypatch.setattr("nlsolve.running.engines.execution.run_case", march)
     result = nlsolve("run", write_study(tmp_path))
     assert result.exit_code == 0
     assert "4 cases: 4 diverged" in result.stderr
@@ -87,7 +87,7 @@ def test_a_crash_is_1(tmp_path, monkeypatch):
     def march(parts, listen, clock):
         raise RuntimeError("[oops]")
 
-    monkeypatch.setattr("nlsolve.running.runner.run_case", march)
+    monkeypatch.setattr("nlsolve.running.engines.execution.run_case", march)
     result = nlsolve("run", write_study(tmp_path))
     assert result.exit_code == 1
     assert "crashed: RuntimeError: [oops] (" in result.stderr
@@ -103,13 +103,13 @@ def test_an_interruption_is_130_and_keeps_what_is_finished(tmp_path, monkeypatch
             raise KeyboardInterrupt
         return fake_march(parts, listen)
 
-    monkeypatch.setattr("nlsolve.running.runner.run_case", march)
+    monkeypatch.setattr("nlsolve.running.engines.execution.run_case", march)
     result = nlsolve("run", write_study(tmp_path), "--out", "o")
     assert result.exit_code == 130
     assert "interrupted; the finished cases are in o and the same command does the rest" in result.stderr
     table = nlsolve("table", "o", "--json")
     assert json.loads(table.stdout)["branches"] == [{"solver.order": "10", "solver.tolerance = 1e-06": 60}]
-    monkeypatch.setattr("nlsolve.running.runner.run_case", fake_march)
+    monkeypatch.setattr("nlsolve.running.engines.execution.run_case", fake_march)
     assert nlsolve("run", write_study(tmp_path), "--out", "o").exit_code == 0
 
 
@@ -133,12 +133,11 @@ def test_invalid_input_is_2_in_one_sentence(tmp_path, arguments, sentence):
     assert result.stdout == ""
 
 
-def test_results_of_another_study_are_2(tmp_path):
+def test_a_folder_takes_the_study_with_other_settings(tmp_path):
     path = write_study(tmp_path)
     assert nlsolve("run", path).exit_code == 0
-    result = nlsolve("run", path, "--set", "law.index=0.3")
-    assert result.exit_code == 2
-    assert "holds results of another study" in result.stderr
+    assert nlsolve("run", path, "--set", "law.index=0.3").exit_code == 0
+    assert nlsolve("run", path).stderr.count("converged before") == 4
 
 
 def test_table(tmp_path):
@@ -178,6 +177,28 @@ def test_plan(tmp_path):
     )
 
 
+def test_plan_says_what_is_run_and_why(tmp_path, monkeypatch):
+    path = write_study(tmp_path)
+    assert "4 new (results in results/study)" in nlsolve("plan", path).stdout
+    assert not (tmp_path / "results").exists()
+    nlsolve("run", path, "--out", "o", "--set", 'sweep=[{grid={"solver.order"=[10],"solver.tolerance"=[1e-6]}}]')
+    told = nlsolve("plan", path, "--out", "o")
+    assert "3 new, 1 kept (results in o)" in told.stdout
+    assert "s to run 3 cases (forecast" in told.stdout
+    document = json.loads(nlsolve("plan", path, "--out", "o", "--json").stdout)
+    assert document["folder"] == "o"
+    assert [row["plan"] for row in document["cases"]] == ["kept", "new", "new", "new"]
+
+
+def test_table_says_how_much_of_the_plan_is_finished(tmp_path):
+    path = write_study(tmp_path)
+    nlsolve("run", path, "--out", "o")
+    assert nlsolve("table", "o").stderr == ""
+    for part in list((tmp_path / "o" / "cases").glob("*.json"))[:3]:
+        part.unlink()
+    assert nlsolve("table", "o").stderr == "o: 1 of 4 cases are finished\n"
+
+
 def test_plugins_and_why_one_failed(monkeypatch):
     registry = registry_of()
     registry.add(Plugin(Newton), "another 2.0")
@@ -197,7 +218,7 @@ def test_plugins_and_why_one_failed(monkeypatch):
 def test_plugins_lists_the_fields_of_sections_without_kinds(monkeypatch):
     monkeypatch.setattr("nlsolve.cli.app.load_registry", registry_of)
     rows = {row["noun"]: row for row in json.loads(nlsolve("plugins", "--json").stdout) if not row["kind"]}
-    assert set(rows) == {"physics", "time", "motion", "start", "record", "stop", "budget"}
+    assert set(rows) == {"physics", "time", "motion", "start", "record", "stop", "budget", "limits"}
     assert rows["time"]["source"] == "nlsolve, for every scene"
     assert [field["name"] for field in rows["time"]["parameters"]] == ["horizon", "increment"]
     assert "divergence_tolerance" in nlsolve("plugins").stdout

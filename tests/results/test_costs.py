@@ -542,7 +542,7 @@ def timed(monkeypatch: pytest.MonkeyPatch) -> list[float]:
         outcome = Outcome(Status.CONVERGED, "", np.zeros(1), 0.0)
         return Record({"status": "converged", "message": "", "seconds": taken, "tangents": 1}, outcome, pd.DataFrame())
 
-    monkeypatch.setattr("nlsolve.running.runner.run_case", march_of)
+    monkeypatch.setattr("nlsolve.running.engines.execution.run_case", march_of)
     return seconds
 
 

@@ -3,21 +3,40 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 import pandas as pd
 import pytest
-from fakes import STUDY, fake_march, registry_of, write_study
+from fakes import COMPONENTS, STUDY, Box, fake_march, registry_of, write_study
+from pydantic import BaseModel
 from threadpoolctl import threadpool_info
 
 import nlsolve
+from nlsolve.plugin import InputFile
 from nlsolve.registry.problems import StudyError
 from nlsolve.results.columns import FIELDS, RUNS, STEPS
 from nlsolve.running.runner import Event, Results, run
-from nlsolve.running.store import Store
+from nlsolve.running.store.identity import identity_of
+from nlsolve.running.store.parts import Parts
+from nlsolve.running.store.standing import standings_of
+from nlsolve.running.store.store import Store
 from nlsolve.study.study import Study
 
 FIGURE = '[[figure]]\nkind = "line"\nname = "range"\ny = "range"\ngroup = ["solver.order", "solver.tolerance"]\n[quick]'
+
+
+class Read(BaseModel):
+    """Nodes of a file."""
+
+    kind: Literal["read"] = "read"
+    path: InputFile
+
+
+class ReadingBox(Box):
+    """A box whose nodes are read."""
+
+    nodes: Read
 
 
 @pytest.fixture
@@ -34,7 +53,7 @@ def marched(monkeypatch) -> list:
         cases.append(parts)
         return fake_march(parts, listen)
 
-    monkeypatch.setattr("nlsolve.running.runner.run_case", march)
+    monkeypatch.setattr("nlsolve.running.engines.execution.run_case", march)
     return cases
 
 
@@ -49,7 +68,7 @@ def failing_on(monkeypatch, number: int, error: BaseException) -> None:
             raise error
         return fake_march(parts, listen)
 
-    monkeypatch.setattr("nlsolve.running.runner.run_case", march)
+    monkeypatch.setattr("nlsolve.running.engines.execution.run_case", march)
 
 
 def test_in_memory(study, tmp_path):
@@ -80,10 +99,18 @@ def test_files(tmp_path):
     tables = {f"tables/branches{ending}" for ending in (".csv", ".md", ".tex")}
     figures = {"figures/range.png", "figures/range.pdf"}
     frames = {"runs.parquet", "runs.csv", "steps.parquet", "steps.csv", "fields.parquet"}
-    assert names == tables | figures | frames | {"study.json", "report.html"}
+    (environment,) = results.runs["environment"].unique()
+    assert names == tables | figures | frames | {
+        "study.json",
+        "shown.json",
+        "report.html",
+        f"environments/{environment}.json",
+    }
     assert results.notes == ()
     assert pd.read_parquet(folder / "runs.parquet")["tangents"].tolist() == [60, 80, 30, 40]
-    assert "How many branches?" in (folder / "report.html").read_text(encoding="utf-8")
+    report = (folder / "report.html").read_text(encoding="utf-8")
+    assert "How many branches?" in report
+    assert f"{environment}: 4 rows" in report
 
 
 def test_a_second_run_computes_nothing_and_says_the_same(study, tmp_path, marched):
@@ -94,9 +121,33 @@ def test_a_second_run_computes_nothing_and_says_the_same(study, tmp_path, marche
     pd.testing.assert_frame_equal(first.steps, again.steps)
 
 
+@pytest.mark.parametrize("gone", ["report.html", "tables/branches.csv", "steps.parquet", "shown.json"])
+def test_what_is_shown_is_made_again_when_it_is_gone_or_damaged(study, tmp_path, gone, marched):
+    first = run(study, tmp_path / "out")
+    content = (tmp_path / "out" / gone).read_bytes()
+    (tmp_path / "out" / gone).unlink()
+    again = run(study, tmp_path / "out")
+    assert (tmp_path / "out" / gone).exists()
+    if not gone.endswith(("html", "json")):  # these have times in them
+        assert (tmp_path / "out" / gone).read_bytes() == content
+    pd.testing.assert_frame_equal(first.runs, again.runs, check_dtype=False)
+    assert len(marched) == 4
+
+
+def test_a_second_run_writes_nothing(study, tmp_path):
+    run(study, tmp_path / "out")
+    times = {path: path.stat().st_mtime_ns for path in (tmp_path / "out").rglob("*") if path.name != "study.json"}
+    again = run(study, tmp_path / "out")
+    assert {path: path.stat().st_mtime_ns for path in times} == times
+    assert again.table("branches").loc[20, 1e-8] == 40
+    retitled = Study.from_toml(write_study(tmp_path, ('name = "branches"', 'name = "b"')), registry=registry_of())
+    run(retitled, tmp_path / "out")
+    assert (tmp_path / "out" / "tables" / "b.csv").exists()
+
+
 def test_a_damaged_part_is_run_again(study, tmp_path, marched):
     run(study, tmp_path / "out")
-    (tmp_path / "out" / "cases" / f"{study.cases[2].id}.steps.parquet").write_bytes(b"PAR1")
+    (tmp_path / "out" / "cases" / f"{identity_of(study.cases[2]).key}.steps.parquet").write_bytes(b"PAR1")
     results = run(study, tmp_path / "out")
     assert [parts.solver.order for parts in marched[4:]] == [20]
     assert results.runs["case"].tolist() == [case.id for case in study.cases]
@@ -118,13 +169,13 @@ def test_a_crash_is_a_row_that_says_what_and_where(study, tmp_path, monkeypatch,
 
 
 def test_an_interruption_leaves_what_is_finished(study, tmp_path, monkeypatch, marched):
-    march = nlsolve.running.runner.run_case
+    march = nlsolve.running.engines.execution.run_case
     failing_on(monkeypatch, 3, KeyboardInterrupt())
     with pytest.raises(KeyboardInterrupt):
         run(study, tmp_path / "out")
     assert pd.read_parquet(tmp_path / "out" / "runs.parquet")["tangents"].tolist() == [60, 80]
     assert len(pd.read_csv(tmp_path / "out" / "steps.csv")) == 4
-    monkeypatch.setattr("nlsolve.running.runner.run_case", march)
+    monkeypatch.setattr("nlsolve.running.engines.execution.run_case", march)
     assert run(study, tmp_path / "out").runs["tangents"].tolist() == [60, 80, 30, 40]
     assert len(marched) == 2, "the two finished cases were not run again"
 
@@ -139,6 +190,37 @@ def test_the_frames_are_not_written_anew_for_every_case(study, tmp_path, monkeyp
     monkeypatch.setattr("nlsolve.running.runner.SECONDS_BETWEEN_FRAMES", -1.0)
     run(study, tmp_path / "other")
     assert len(written) == 1 + len(study.cases) + 1
+
+
+def test_a_grown_study_computes_what_is_new(study, tmp_path, marched):
+    """One more value, then another question and table, then a setting by hand, then the first study again."""
+    run(study, tmp_path / "out")
+    path = write_study(tmp_path, ("[10, 20]", "[10, 15, 20]"), ("How many", "How few"), ('name = "b', 'name = "c'))
+    grown = run(Study.from_toml(path, registry=registry_of()), tmp_path / "out")
+    assert [parts.solver.order for parts in marched[4:]] == [15, 15]
+    assert grown.runs["tangents"].tolist() == [60, 80, 40, 53, 30, 40]
+    run(Study.from_toml(path, {"law.index": 0.3}, registry=registry_of()), tmp_path / "out")
+    assert len(marched) == 12
+    again = run(study, tmp_path / "out")
+    assert len(marched) == 12
+    assert again.runs["case"].tolist() == [case.id for case in study.cases]
+    assert pd.read_parquet(tmp_path / "out" / "runs.parquet")["tangents"].tolist() == [60, 80, 30, 40]
+
+
+def test_a_case_whose_file_changes_while_it_runs_is_not_kept(tmp_path, monkeypatch):
+    place = tmp_path / "nodes.csv"
+    place.write_text("old", encoding="utf-8")
+    nodes = ('kind = "box"', f'kind = "box"\nnodes = {{ kind = "read", path = "{place}" }}')
+    study = Study.from_toml(write_study(tmp_path, nodes), registry=registry_of(ReadingBox, *COMPONENTS[1:]))
+
+    def march(parts, listen, clock):
+        place.write_text("new", encoding="utf-8")
+        return fake_march(parts, listen)
+
+    monkeypatch.setattr("nlsolve.running.engines.execution.run_case", march)
+    assert len(run(study, tmp_path / "out").runs) == 4
+    words = standings_of(Parts(tmp_path / "out"), study)
+    assert list(words.values()) == ["new", "kept", "kept", "kept"], "the first case began with the old file"
 
 
 def test_events(study, tmp_path):
@@ -162,7 +244,7 @@ def test_a_case_has_one_thread(study, monkeypatch):
         seen.extend(pool["num_threads"] for pool in threadpool_info())
         return fake_march(parts, listen)
 
-    monkeypatch.setattr("nlsolve.running.runner.run_case", march)
+    monkeypatch.setattr("nlsolve.running.engines.execution.run_case", march)
     run(study)
     assert seen
     assert set(seen) == {1}

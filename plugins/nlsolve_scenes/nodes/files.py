@@ -11,7 +11,7 @@ from typing import Any, Literal
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 
-from nlsolve.plugin import Cloud, SolveError, Status
+from nlsolve.plugin import Cloud, InputFile, SolveError, Status
 
 try:
     import meshio
@@ -33,7 +33,9 @@ class NodeFile(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid")
 
     kind: Literal["file"] = "file"
-    path: str = Field(description="file name, relative to the folder the study is run in: .csv, .msh, .inp, .vtu, …")
+    path: InputFile = Field(
+        description="file name, relative to the folder the study is run in: .csv, .msh, .inp, .vtu, …"
+    )
 
     def cloud(self, needed: tuple[str, ...]) -> Cloud:
         """The nodes with the groups `needed`; nodes of other groups become interior nodes.

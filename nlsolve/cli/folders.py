@@ -1,0 +1,133 @@
+"""The commands on results folders: table, status, merge, gc, export."""
+
+from __future__ import annotations
+
+import json
+import shlex
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from nlsolve.cli.endings import ending
+from nlsolve.cli.options import Json, Out, Quick, Settings, StudyFile, default_folder
+from nlsolve.cli.printing import count, say, stdout
+from nlsolve.registry.problems import StudyError, did_you_mean
+from nlsolve.running.store.reading import FolderStatus, read_tables, status_of_folder
+from nlsolve.running.store.upkeep import export as packed
+from nlsolve.running.store.upkeep import merge_folders, remove, superfluous
+from nlsolve.show.tables import build
+from nlsolve.study.study import Study
+from nlsolve.study.sweeps import parse_assignments
+
+folders = typer.Typer()
+
+Folder = Annotated[Path, typer.Argument(metavar="DIR", help="a results folder")]
+
+
+@folders.command()
+def table(
+    folder: Folder,
+    name: Annotated[str | None, typer.Argument(help="one declared table; default: all")] = None,
+    as_json: Json = False,
+) -> None:
+    """Print the declared tables of a results folder, of whatever is finished."""
+    with ending():
+        described, runs = read_tables(folder)
+        names = [spec.name for spec in described.tables]
+        if name is not None and name not in names:
+            raise StudyError(f"{folder}: there is no table {name!r}; {did_you_mean(name, names)}")
+        tables = [build(spec, runs) for spec in described.tables if name in (None, spec.name)]
+    if len(runs) < len(described.cases):
+        say(f"{folder}: {len(runs)} of {count(len(described.cases))} are finished")
+    if as_json:
+        typer.echo(json.dumps({table.spec.name: table.long() for table in tables}))
+        return
+    for declared in tables:
+        for printed in declared.rich():
+            stdout().print(printed)
+
+
+@folders.command()
+def status(folder: Folder, as_json: Json = False) -> None:
+    """Tell how far a results folder is: finished, running, failed and left. It works during a run and after a kill."""
+    with ending():
+        found = status_of_folder(folder)
+    if as_json:
+        typer.echo(json.dumps(_plain(folder, found)))
+        return
+    if found.study is None:
+        typer.echo(f"{folder}: its study.json cannot be read, so what is left is not known")
+    else:
+        typer.echo(f"{folder}: {found.study.question}")
+    words = ", ".join(f"{number} {word}" for word, number in found.endings.items())
+    finished = sum(found.endings.values())
+    typer.echo(f"{finished} of {count(found.planned)} finished{f' ({words})' if words else ''}")
+    typer.echo(f"{len(found.running)} running, {found.left} left")
+    if found.others:
+        typer.echo(f"{count(found.others)} more, of other studies, other settings or earlier sources")
+    for case, message in found.failures.items():
+        say(f"case {case} failed: {message}")
+
+
+def _plain(folder: Path, found: FolderStatus) -> dict[str, object]:
+    return {
+        "folder": str(folder),
+        "study": found.study.name if found.study else None,
+        "question": found.study.question if found.study else None,
+        "cases": found.planned,
+        "finished": sum(found.endings.values()),
+        "endings": dict(found.endings),
+        "failures": dict(found.failures),
+        "running": list(found.running),
+        "left": found.left,
+        "others": found.others,
+    }
+
+
+@folders.command()
+def merge(
+    source: Annotated[Path, typer.Argument(metavar="A", help="a results folder")],
+    into: Annotated[Path, typer.Argument(metavar="B", help="the folder to copy to, which need not exist")],
+) -> None:
+    """Copy what is finished in the results folder A to the results folder B. A stays as it is."""
+    with ending():
+        done = merge_folders(source, into)
+    told = f"{into}: {count(done.copied)} copied from {source}, {done.there} there already"
+    typer.echo(f"{told}, {done.damaged} damaged and left out" if done.damaged else told)
+
+
+@folders.command()
+def gc(
+    folder: Folder,
+    others: Annotated[bool, typer.Option("--others", help="also remove the cases of other studies")] = False,
+    dry_run: Annotated[bool, typer.Option("--dry-run", help="only say what would be removed")] = False,
+) -> None:
+    """Remove from a results folder what nothing needs: damaged and outdated cases, and what killed runs have left."""
+    with ending():
+        files = superfluous(folder, others)
+        if dry_run:
+            for path in files:
+                typer.echo(str(path))
+            return
+        freed = remove(folder, files)
+    typer.echo(f"{folder}: {len(files)} file{'' if len(files) == 1 else 's'} removed, {freed / 1e6:.3g} MB")
+
+
+@folders.command()
+def export(
+    study: StudyFile,
+    out: Out = None,
+    settings: Settings = None,
+    quick: Quick = False,
+    to: Annotated[Path | None, typer.Option(metavar="FILE", help="the zip; default: NAME.zip")] = None,
+) -> None:
+    """Pack a study, the files of nodes it reads, the versions of plugins, and its results into one zip to rerun."""
+    folder, target = out or default_folder(study, quick), to or Path(f"{study.stem}.zip")
+    options = [word for setting in settings or [] for word in ("--set", setting)] + ["--quick"] * quick
+    with ending():
+        checked = Study.from_toml(study, parse_assignments(settings or []), quick)
+        missing = packed(checked, study.read_text(encoding="utf-8"), shlex.join(options), folder, target)
+    for path in missing:
+        say(f"{path} is not in the zip: the study must name it by a path within the folder it is run in")
+    typer.echo(f"{target}: {target.stat().st_size / 1e6:.3g} MB")

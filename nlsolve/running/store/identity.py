@@ -1,0 +1,121 @@
+"""What determines the numbers of a case: its validated parameters, the files it reads, and the source it runs.
+
+Names of tables and settings, the question, the order of sweeps and the other cases of a study have no part in it.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from pydantic import BaseModel
+
+from nlsolve.contracts.component import NAMES_A_FILE
+from nlsolve.registry.hookspecs import PROJECT
+from nlsolve.running.store.sources import fingerprint, sources_of
+from nlsolve.study.case import Case
+
+MISSING = "missing"
+"""Stands for the content of a file that cannot be read; when it can be, the case is another one."""
+
+
+@dataclass(frozen=True)
+class Identity:
+    """What determines the numbers of a case.
+
+    case : digest of its validated parameters, all defaults filled in.
+    code : package -> version and fingerprint of its source; see `nlsolve.running.store.sources`.
+    files : path -> fingerprint of the contents of each file that a component reads.
+    """
+
+    case: str
+    code: Mapping[str, str]
+    files: Mapping[str, str]
+
+    @property
+    def key(self) -> str:
+        """The name of a part: CASE-REST, with one digest of code and files."""
+        rest = json.dumps([dict(self.code), dict(self.files)], sort_keys=True)
+        return f"{self.case}-{fingerprint(rest.encode())}"
+
+    def plain(self) -> dict[str, Any]:
+        """The identity as JSON values."""
+        return asdict(self)
+
+    def changes_since(self, old: Identity) -> tuple[str, ...]:
+        """What differs between two identities of one case: "changed plugin honey 1.0 -> 1.1", "changed file a.csv"."""
+        told = [
+            f"changed {'' if name == PROJECT else 'plugin '}{name}{_versions(was, now)}"
+            for name, was, now in _differing(old.code, self.code)
+        ]
+        return (*told, *(f"changed file {name}" for name, _, _ in _differing(old.files, self.files)))
+
+
+def case_of(key: str) -> str:
+    """The case that a part's name begins with."""
+    return key.partition("-")[0]
+
+
+def identity_of(case: Case) -> Identity:
+    """The identity of a case as it would be run now."""
+    code: dict[str, str] = {}
+    files: dict[str, str] = {}
+    for value in _models(case.parts):
+        code |= sources_of(type(value))
+        files |= {str(path): _content(path) for path in files_read(value)}
+    return Identity(case.id, dict(sorted(code.items())), dict(sorted(files.items())))
+
+
+def files_read(value: BaseModel) -> Iterator[Path]:
+    """The files whose contents a component depends on: its fields of type `InputFile`, and those that hold a Path."""
+    for name, field in type(value).model_fields.items():
+        given = getattr(value, name)
+        if isinstance(given, Path) or (isinstance(given, str) and NAMES_A_FILE in field.metadata):
+            yield Path(given)
+
+
+def _models(parts: Any) -> Iterator[BaseModel]:
+    """Every component of a case, at any depth."""
+    for name in type(parts).model_fields:
+        yield from _inside(getattr(parts, name))
+
+
+def _inside(value: Any) -> Iterator[BaseModel]:
+    if isinstance(value, BaseModel):
+        yield value
+        yield from _models(value)
+    elif isinstance(value, Mapping):
+        for inner in value.values():
+            yield from _inside(inner)
+    elif isinstance(value, list | tuple):
+        for inner in value:
+            yield from _inside(inner)
+
+
+_contents: dict[tuple[str, int, int], str] = {}
+
+
+def _content(path: Path) -> str:
+    """The fingerprint of a file's contents, computed once while neither its time nor its size changes."""
+    try:
+        found = path.stat()
+        key = (str(path.resolve()), found.st_mtime_ns, found.st_size)
+        if key not in _contents:
+            _contents[key] = fingerprint(path.read_bytes())
+    except OSError:  # not there, or a folder: the case will say so in its row
+        return MISSING
+    return _contents[key]
+
+
+def _differing(old: Mapping[str, str], new: Mapping[str, str]) -> list[tuple[str, str, str]]:
+    names = sorted({*old, *new})
+    return [(name, old.get(name, ""), new.get(name, "")) for name in names if old.get(name) != new.get(name)]
+
+
+def _versions(was: str, now: str) -> str:
+    """ " 1.0 -> 1.1", or nothing where the version is the same or there is none."""
+    before, after = (text.rpartition(" ")[0] for text in (was, now))
+    return f" {before} -> {after}" if before != after else ""

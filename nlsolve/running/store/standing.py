@@ -1,0 +1,86 @@
+"""What a results folder has of each case of a study, and why a case is to be run: new, changed, retried, kept."""
+
+from __future__ import annotations
+
+import time
+from collections import defaultdict
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from nlsolve.contracts.status import Status
+from nlsolve.results.costs.cost_prediction import UNITS
+from nlsolve.results.verdicts import number, status_of
+from nlsolve.running.retry import is_final, is_tried_again
+from nlsolve.running.store.identity import Identity, case_of, identity_of
+from nlsolve.running.store.parts import Entry, Parts
+from nlsolve.study.case import Case
+from nlsolve.study.study import Study
+from nlsolve.study.timing import Timing
+
+KEPT, NEW, DAMAGED, TIMED = "kept", "new", "damaged", "timed again"
+"""Words for a case: its part is kept, there is none, it cannot be read, or its seconds were taken in another way."""
+
+
+@dataclass(frozen=True)
+class Standing:
+    """What a folder has of one case.
+
+    word : KEPT, NEW, DAMAGED, TIMED, "retried (crashed)", or what has changed: "changed plugin honey 1.0 -> 1.1".
+    entry : the part that stands, if its case is kept or timed again.
+    """
+
+    identity: Identity
+    word: str
+    entry: Entry | None = None
+
+
+class Standings:
+    """What a folder has of cases, looked up one by one; the folder need not exist, and is not written.
+
+    retry : see `is_tried_again`.
+
+    A part that was written since counts whatever its status: another run has just tried the case.
+    """
+
+    def __init__(self, parts: Parts, timing: Timing, retry: Collection[Status] = ()) -> None:
+        self.parts, self.timing, self.retry = parts, timing, retry
+        self.begun = time.time()
+        self._keys: defaultdict[str, list[str]] = defaultdict(list)
+        for key in parts.names():
+            self._keys[case_of(key)].append(key)
+
+    def of(self, case: Case) -> Standing:
+        """What the folder has of a case as it would be run now."""
+        identity = identity_of(case)
+        entry = self.parts.entry(identity.key)
+        if entry is None:
+            return Standing(identity, self._why(identity))
+        run = entry.run({})
+        if is_tried_again(run, case.parts.limits, self.retry) and entry.written < self.begun:
+            return Standing(identity, f"retried ({status_of(run).word})")
+        enough = is_final(run) or rounds_of(run, self.timing) >= self.timing.rounds
+        return Standing(identity, KEPT if enough else TIMED, entry)
+
+    def _why(self, identity: Identity) -> str:
+        """Why no part stands for an identity: what has changed since the last part of its case, if there is one."""
+        keys = self._keys.get(identity.case, [])
+        if identity.key in keys:
+            return DAMAGED
+        earlier = [entry for entry in map(self.parts.entry, keys) if entry is not None]
+        if not earlier:
+            return DAMAGED if keys else NEW
+        last = max(earlier, key=lambda entry: entry.written)
+        return ", ".join(identity.changes_since(last.identity))
+
+
+def standings_of(parts: Parts, study: Study, retry: Collection[Status] = ()) -> dict[str, str]:
+    """Case -> its word, for every case of a study."""
+    found = Standings(parts, study.timing, retry)
+    return {case.id: found.of(case).word for case in study.cases}
+
+
+def rounds_of(run: Mapping[str, Any], timing: Timing) -> int:
+    """Number of rounds in which a case has been timed as the study asks; 0 for a case that crashed."""
+    known, units = number(run.get("rounds")), UNITS[0] in run or not timing.calibrate
+    return int(known) if known > 0 and units and run.get("clock") == timing.clock else 0
