@@ -21,9 +21,9 @@ from nlsolve.cli.printing import (
     print_frame,
     print_plugins,
     print_results,
+    print_table,
     say,
     say_endings,
-    stdout,
 )
 from nlsolve.cli.progress import Watch
 from nlsolve.registry.problems import StudyError, did_you_mean
@@ -171,8 +171,7 @@ def table(
         typer.echo(json.dumps({table.spec.name: table.long() for table in tables}))
         return
     for declared in tables:
-        for printed in declared.rich():
-            stdout().print(printed)
+        print_table(declared)
 
 
 @contextmanager

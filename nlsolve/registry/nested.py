@@ -17,7 +17,7 @@ from nlsolve.contracts.nonlinear_solver import NonlinearSolver
 from nlsolve.contracts.rules.globalization import Globalization
 from nlsolve.contracts.rules.homotopy_form import HomotopyForm
 from nlsolve.contracts.rules.range_rule import RangeRule
-from nlsolve.registry.registry import load_registry
+from nlsolve.registry.registry import registry_in_use
 
 
 def installed(contract: type[Component], by_name: bool = False) -> BeforeValidator:
@@ -28,7 +28,7 @@ def installed(contract: type[Component], by_name: bool = False) -> BeforeValidat
 
     def component(value: Any) -> Component:
         table = {"kind": value} if by_name and isinstance(value, str) else value
-        return load_registry().component(contract.noun, table)
+        return registry_in_use().component(contract.noun, table)
 
     return BeforeValidator(component)
 
@@ -44,5 +44,6 @@ AnyRange = Annotated[SerializeAsAny[RangeRule], installed(RangeRule, by_name=Tru
 
 AnyForm = Annotated[SerializeAsAny[HomotopyForm], installed(HomotopyForm, by_name=True)]
 """The type of a field that holds a homotopy form, by its table or its name."""
+
 AnyDiscretizer = Annotated[SerializeAsAny[Discretizer], installed(Discretizer)]
 """The type of a field that holds a discretizer."""

@@ -12,7 +12,7 @@ from pydantic import BaseModel, ValidationError
 from nlsolve.contracts.component import Component
 from nlsolve.contracts.status import InputError
 from nlsolve.registry.component_tables import ComponentTable
-from nlsolve.registry.registry import CONTRACTS, load_registry
+from nlsolve.registry.registry import CONTRACTS, registry_in_use
 from nlsolve.registry.toml_lines import Place, nearest_line
 
 LONGEST_VALUE = 60
@@ -199,6 +199,9 @@ def _chosen(candidates: list[type[BaseModel]], document: Any) -> type[BaseModel]
     """The model whose `kind` the document names, or the class that a table was made from."""
     if isinstance(document, ComponentTable):
         return document.cls
+    noun = getattr(candidates[0], "noun", None)
+    if noun in CONTRACTS and (named := registry_in_use().class_of(noun, document)) is not None:
+        return named
     for candidate in candidates:
         info = candidate.model_fields.get("kind")
         if (
@@ -213,7 +216,7 @@ def _chosen(candidates: list[type[BaseModel]], document: Any) -> type[BaseModel]
 def _models_in(annotation: Any) -> list[type[BaseModel]]:
     """The models in a type such as Annotated[A | B, …] or list[A]; for a contract, its installed classes."""
     if isinstance(annotation, type) and issubclass(annotation, Component) and annotation in CONTRACTS.values():
-        return list(load_registry().classes(annotation.noun).values())
+        return list(registry_in_use().classes(annotation.noun).values())
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         return [annotation]
     inner = getattr(annotation, "__value__", None)

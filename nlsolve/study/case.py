@@ -22,7 +22,8 @@ from nlsolve.registry.problems import ABSENT, Problem, problems_in, unknown
 from nlsolve.registry.registry import CONTRACTS, PluginRow, Registry, parameters_of
 from nlsolve.results.parameters import names_settings
 from nlsolve.solving.stopping import Budget, StoppingTest
-from nlsolve.study.sweeps import Document, Point, leaves
+from nlsolve.study.known_parts import KnownPart, KnownParts, keys_of
+from nlsolve.study.sweeps import Document, Point
 
 COMMON: Mapping[str, Section] = {
     "linear": Section(LinearSolver),
@@ -72,13 +73,16 @@ class Invalid(Exception):
 
 
 class Composer:
-    """Makes cases from documents, of the installed components and of those that a document holds as instances."""
+    """Makes cases of the installed components and of those that `documents` hold as instances."""
 
-    def __init__(self, registry: Registry, document: Document) -> None:
+    def __init__(self, registry: Registry, *documents: Mapping[str, Any]) -> None:
         self.registry = registry
+        self._known = KnownParts()
         self._models: dict[type[Component], type[BaseModel]] = {}
         self.all_sections: dict[str, Section] = {}
-        for scene in (*registry.classes(Scene.noun).values(), *classes_in(document)):
+        given = list(classes_in(documents))
+        self._holds_instances = bool(given)
+        for scene in (*registry.classes(Scene.noun).values(), *given):
             if issubclass(scene, Scene):
                 self.all_sections |= sections_of(scene)
         self.all_sections |= COMMON
@@ -90,7 +94,8 @@ class Composer:
 
     def case(self, document: Document, points: Sequence[Point]) -> Case:
         """The case of a document to which the values of `points`, one of each sweep, are assigned. Raises Invalid."""
-        parts: Any = self.parts(document)
+        known, model = self.parts(document)
+        parts: Any = model.model_construct(**{name: part.component for name, part in known.items()})
         if unclaimed := claims_missing(parts.solver, parts.stop):
             raise Invalid(unclaimed)
         try:
@@ -98,14 +103,15 @@ class Composer:
         except Misfit as misfit:
             value = getattr(getattr(parts, misfit.section), misfit.field)
             raise Invalid([Problem((misfit.section, misfit.field), _plain(value), misfit.expected)]) from misfit
-        plain = self.plain(parts)
-        canonical = json.dumps(plain, sort_keys=True, separators=(",", ":"))
-        digest = hashlib.sha256(canonical.encode()).hexdigest()[:DIGEST_LETTERS]
-        chosen = {name: section for name, section in plain.items() if section is not None}  # None: it has no component
-        return Case(digest, parts, *_parameters(chosen, points))
+        canonical = ",".join(f"{json.dumps(name)}:{known[name].text}" for name in sorted(known))
+        digest = hashlib.sha256(f"{{{canonical}}}".encode()).hexdigest()[:DIGEST_LETTERS]
+        return Case(digest, parts, *_parameters(known, points))
 
-    def parts(self, document: Document) -> BaseModel:
-        """The validated component of each section; a section that is left out gets its default. Raises Invalid."""
+    def parts(self, document: Document) -> tuple[Mapping[str, KnownPart], type[BaseModel]]:
+        """The validated part of each section, and the model of them all; a section that is left out gets its default.
+
+        Raises Invalid.
+        """
         scene = self.named(document, Scene.noun, Scene)
         if issubclass(scene, Scene):
             sections = sections_of(scene)
@@ -133,10 +139,17 @@ class Composer:
             if default is not None:
                 _complete(document, name, default)
         model = self.model(scene, sections)
+        keys = None if self._holds_instances else keys_of(document, model.model_fields)
+        found = None if keys is None else self._known.get(scene, keys)
+        if found is not None:
+            return found, model
         try:
-            return model.model_validate(document)
+            validated = model.model_validate(document)
         except ValidationError as error:
             raise Invalid(problems_in(error, model, document)) from error
+        plain = self.plain(validated)
+        found = {name: KnownPart.of(name, getattr(validated, name), plain[name]) for name in model.model_fields}
+        return (found if keys is None else self._known.shared(scene, keys, found)), model
 
     def model(self, scene: type[Component], sections: Mapping[str, Section]) -> type[BaseModel]:
         """The pydantic model of the sections of one class of scenes."""
@@ -154,8 +167,9 @@ class Composer:
         return self._models[scene]
 
     def plain(self, parts: BaseModel) -> dict[str, Any]:
-        """The sections as JSON values. A component whose class is not the installed one of its kind has an entry
-        `class` as well, so that cases of different classes get different digests.
+        """The sections as JSON values. A component whose class is not the one that its kind alone means has its
+        qualified kind, or, when nobody offers the class, an entry `class`: cases of different classes get different
+        digests.
 
         Raises Invalid for a field that cannot be written as JSON.
         """
@@ -165,16 +179,18 @@ class Composer:
             sentence = f"a field cannot be written as JSON, by which cases are told apart: {error}"
             raise Invalid([Problem((name,), ABSENT, sentence) for name in unwritable(parts)]) from error
         for name in plain:
-            self._add_class(plain[name], getattr(parts, name))
+            self._tell_class(plain[name], getattr(parts, name))
         return plain
 
-    def _add_class(self, plain: Any, value: object) -> None:
+    def _tell_class(self, plain: Any, value: object) -> None:
         if not isinstance(value, Component):
             return
         for name in type(value).model_fields:
-            self._add_class(plain.get(name), getattr(value, name))
-        if value.noun in CONTRACTS and not self.registry.is_installed(value):
-            plain["class"] = class_name(type(value))
+            self._tell_class(plain.get(name), getattr(value, name))
+        if value.noun not in CONTRACTS:
+            return
+        kind = self.registry.kind_of(value)
+        plain |= {"class": class_name(type(value))} if kind is None else {"kind": kind}
 
     def named(self, document: Document, section: str, contract: type[Component]) -> type[Component]:
         """The class of the component that a section names by kind or holds as an instance, or Component."""
@@ -207,7 +223,7 @@ def section_rows(registry: Registry) -> list[PluginRow]:
     for kind, scene in scenes.items():
         for name in sections_of(scene) if issubclass(scene, Scene) else ():
             askers.setdefault(name, []).append(kind)
-    found = Composer(registry, {}).all_sections
+    found = Composer(registry).all_sections
     return [
         PluginRow(
             name,
@@ -250,15 +266,16 @@ def unwritable(composition: BaseModel) -> list[str]:
     return found
 
 
-def _parameters(plain: Mapping[str, Any], points: Sequence[Point]) -> tuple[dict[str, Any], tuple[str, ...]]:
+def _parameters(known: Mapping[str, KnownPart], points: Sequence[Point]) -> tuple[dict[str, Any], tuple[str, ...]]:
     """The names of a case's settings and all its parameters, under dotted names; and the names of the swept ones."""
-    parameters = {name: json.dumps(value) if isinstance(value, list | dict) else value for name, value in leaves(plain)}
-    assigned = [name for point in points if not point.name for name in point.values]
-    swept = [
-        parameter
-        for parameter in parameters
-        if any(parameter == name or parameter.startswith(f"{name}.") for name in assigned)
-    ]
+    assigned = {name for point in points if not point.name for name in point.values}
+    below = tuple(f"{name}." for name in assigned)
+    parameters: dict[str, Any] = {}
+    swept: list[str] = []
+    for section, part in known.items():
+        parameters |= part.parameters
+        if any(name.partition(".")[0] == section for name in assigned):
+            swept += [name for name in part.parameters if name in assigned or name.startswith(below)]
     settings: dict[str, str] = {}
     for point in points:
         if point.name:

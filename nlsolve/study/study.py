@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import re
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -79,7 +79,7 @@ class Study:
         except tomllib.TOMLDecodeError as error:
             raise StudyError(_syntax(str(path), str(error))) from error
         source = Source(str(path), lines_of(text))
-        return _Builder(source, document, overrides or {}, quick, registry or load_registry()).study(Path(path).stem)
+        return _built(source, document, overrides or {}, quick, registry or load_registry(), Path(path).stem)
 
     @classmethod
     def from_dict(
@@ -94,7 +94,20 @@ class Study:
 
         Raises StudyError as `from_toml` does.
         """
-        return _Builder(Source(name), document, overrides or {}, quick, registry or load_registry()).study(name)
+        return _built(Source(name), document, overrides or {}, quick, registry or load_registry(), name)
+
+
+def _built(
+    source: Source,
+    document: Mapping[str, Any],
+    overrides: Mapping[str, Any],
+    quick: bool,
+    registry: Registry,
+    name: str,
+) -> Study:
+    """The study of a document, in which components inside components are those of the same registry."""
+    with registry.in_use():
+        return _Builder(source, document, overrides, quick, registry).study(name)
 
 
 class _Builder:
@@ -104,7 +117,7 @@ class _Builder:
         self, source: Source, document: Mapping[str, Any], overrides: Mapping[str, Any], quick: bool, registry: Registry
     ) -> None:
         self.document: Document = merged({}, document)
-        self.composer = Composer(registry, self.document)
+        self.composer = Composer(registry, self.document, overrides)
         aliases = {name: source.at(place) for name, place in swept_places(self.document).items()}
         quick_values: Document = {}
         if quick:
@@ -192,43 +205,31 @@ class _Builder:
             except _Refused as refused:
                 sentences += refused.sentences
                 continue
-            source = self.source_of(points, named, by_hand)
             twin = cases.setdefault(case.id, case)  # overrides may make two cases one
-            names = [
-                ", ".join(word for name, word in each.parameters.items() if names_settings(name))
-                for each in (twin, case)
-            ]
-            if names[0] != names[1]:
+            if twin is not case and (names := [_settings_of(twin), _settings_of(case)]) != names[:1] * 2:
                 hand = " with what is set by hand" if by_hand else ""
                 same = f"{names[0]!r} and {names[1]!r} are one and the same case{hand}: change one of them, or drop it"
                 place = next(point.place for point in points if point.name)
-                sentences.append(Problem(place, ABSENT, same).sentence(source))
+                sentences.append(Problem(place, ABSENT, same).sentence(self.source_of(points, named, by_hand)))
         self.refuse_sentences(sentences)
         cases = references | cases  # references first: the other cases are compared with them as they end
-        everyone = [case.parameters for case in cases.values()]
-        # Only a parameter that both cases have can differ: the defaults of one kind do not tell cases apart.
-        differing = {
-            name
-            for parameters in everyone
-            for name, value in parameters.items()
-            if any(name in other and other[name] != value for other in everyone)
-        }
+        differing = _differing([case.parameters for case in cases.values()])
         return tuple(
             replace(case, swept=tuple(name for name in case.swept if name in differing)) for case in cases.values()
         )
 
     def combined(self, base: Document, points: tuple[Point, ...], by_hand: Mapping[str, Any], named: set[str]) -> Case:
         """The case of one combination of points; overrides replace their values. Raises _Refused with sentences."""
-        source = self.source_of(points, named, by_hand)
         assigned = {name: value for point in points for name, value in point.values.items()}
         document = merged({}, base)
         sections_first = dict(sorted(assigned.items(), key=lambda item: item[0].count(".")))
         wrong = assign_all(document, sections_first) + assign_all(document, by_hand)
-        if wrong:
-            raise _Refused([problem.sentence(source) for problem in wrong])
         try:
+            if wrong:
+                raise Invalid(wrong)
             return self.composer.case(document, points)
         except Invalid as invalid:
+            source = self.source_of(points, named, by_hand)
             raise _Refused([problem.sentence(source) for problem in invalid.problems]) from invalid
 
     def reference(
@@ -269,6 +270,23 @@ class _Refused(Exception):
     def __init__(self, sentences: list[str]) -> None:
         super().__init__()
         self.sentences = sentences
+
+
+def _settings_of(case: Case) -> str:
+    """The names of the settings that a case was made by."""
+    return ", ".join(word for name, word in case.parameters.items() if names_settings(name))
+
+
+def _differing(everyone: Sequence[Mapping[str, Any]]) -> set[str]:
+    """The parameters of which two cases that have them hold different values: the defaults of one kind tell no cases
+    apart."""
+    first: dict[str, Any] = {}
+    differing: set[str] = set()
+    for parameters in everyone:
+        for name, value in parameters.items():
+            if name not in differing and first.setdefault(name, value) != value:
+                differing.add(name)
+    return differing
 
 
 def _syntax(path: str, message: str) -> str:

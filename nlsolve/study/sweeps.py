@@ -152,7 +152,7 @@ def merged(old: Any, new: Any) -> Any:
         table = {**under, **{name: merged(under.get(name), value) for name, value in new.items()}}
         origin = new if whole else under
         return ComponentTable(origin.cls, table) if isinstance(origin, ComponentTable) else table
-    return deepcopy(new)
+    return new if isinstance(new, str | int | float) else deepcopy(new)  # deepcopy is slow, and most are such
 
 
 def leaves(table: Mapping[str, Any], above: str = "", whole_kinds: bool = False) -> Iterator[tuple[str, Any]]:

@@ -186,7 +186,8 @@ def test_plugins_and_why_one_failed(monkeypatch):
     result = nlsolve("plugins")
     assert result.exit_code == 0
     assert "order: int = 20  p" in result.stdout
-    assert "offered by fakes 1.0 and another 2.0: uninstall all but one" in result.stdout
+    assert "fakes:newton" in result.stdout
+    assert "another:newton" in result.stdout
     assert "it has no function nlsolve_components" in result.stdout
     rows = json.loads(nlsolve("plugins", "--json").stdout)
     anm = next(row for row in rows if row["kind"] == "anm")
@@ -201,6 +202,21 @@ def test_plugins_lists_the_fields_of_sections_without_kinds(monkeypatch):
     assert rows["time"]["source"] == "nlsolve, for every scene"
     assert [field["name"] for field in rows["time"]["parameters"]] == ["horizon", "increment"]
     assert "divergence_tolerance" in nlsolve("plugins").stdout
+
+
+def test_many_rows_are_lines_without_rules(tmp_path):
+    orders = ("[10, 20]", str(list(range(2, 303))))
+    lines = nlsolve("plan", write_study(tmp_path, orders)).stdout.splitlines()
+    assert lines[0] == "602 cases"
+    assert lines[1].split()[:3] == ["case", "solver.order", "solver.tolerance"]
+    assert [line.split()[1:3] for line in lines[2:4]] == [["2", "1e-06"], ["2", "1e-08"]]
+    assert "━" not in "".join(lines)
+    tall = (
+        ('columns = "solver.tolerance"\n', ""),
+        ('rows = "solver.order"', 'rows = ["solver.order", "solver.tolerance"]'),
+    )
+    printed = nlsolve("run", write_study(tmp_path, orders, *tall)).stdout
+    assert "branches\nsolver.order  solver.tolerance  tangents\n2             1e-06             " in printed
 
 
 def test_version():

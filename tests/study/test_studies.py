@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tomllib
+from time import process_time
 from typing import Any
 
 import pytest
@@ -102,6 +103,44 @@ class TestCases:
         document = {name: value for name, value in document.items() if name not in ("table", "quick")}
         (case,) = Study.from_dict(document, registry=REGISTRY).cases
         assert (case.parts.scene.side, case.parts.solver) == ("right", Newton())
+
+
+class TestManyCases:
+    GRID = '{ "solver.order" = [10, 20], "solver.tolerance" = [1e-6, 1e-8] }'
+
+    def of(self, orders: int, tolerances: int) -> Study:
+        """A study of orders × tolerances cases."""
+        grid = {"solver.order": list(range(2, 2 + orders)), "law.index": [1.0 + k for k in range(tolerances)]}
+        table = {"name": "t", "rows": "solver.order", "columns": "law.index", "value": "tangents"}
+        return Study.from_dict({**tomllib.loads(STUDY), "sweep": [{"grid": grid}], "table": [table]}, registry=REGISTRY)
+
+    def test_a_section_is_validated_once_a_distinct_table(self, monkeypatch):
+        validated = []
+        component = type(REGISTRY).component
+        monkeypatch.setattr(type(REGISTRY), "component", lambda *asked: validated.append(asked) or component(*asked))
+        cases = self.of(30, 20).cases
+        assert len(cases) == len({case.id for case in cases}) == 600
+        assert len({id(case.parts.solver) for case in cases}) == 30
+        assert len({id(case.parts.law) for case in cases}) == 20
+        assert len(validated) < 600
+
+    def test_ten_thousand_cases_take_less_than_five_seconds(self):
+        begun = process_time()
+        study = self.of(100, 100)
+        assert process_time() - begun < 5.0
+        assert len(study.cases) == 10_000
+        assert study.cases[-1].swept == ("law.index", "solver.order")
+
+    def test_values_that_json_cannot_hold_are_validated_each_time(self, tmp_path):
+        grid = '{ "law.index" = [0.5, 1979-05-27] }'
+        message = complaint(
+            tmp_path, (self.GRID, grid), ('rows = "solver.order"\ncolumns = "solver.tolerance"', 'rows = "law.index"')
+        )
+        assert "line 16: law.index = datetime.date(1979, 5, 27): should be a valid number" in message
+
+    def test_numbers_of_two_types_are_not_mixed_up(self, tmp_path):
+        message = complaint(tmp_path, ("[10, 20]", "[10, 10.5]"))
+        assert "line 16: solver.order = 10.5: should be a valid integer" in message
 
 
 SETTINGS = """each = [
@@ -478,7 +517,7 @@ class TestMoved:
         assert complaint(tmp_path, overrides={"record": [0.1, 0.2]}) == f"/study.toml, --set: {told}"
 
     def test_every_new_place_exists(self):
-        known = {*Composer(REGISTRY, {}).sections, *Frame.model_fields}
+        known = {*Composer(REGISTRY).sections, *Frame.model_fields}
         assert all(new.split(".")[0] in known for new in MOVED.values())
         assert not any(old in known for old in MOVED)
         parts = read_parts()
