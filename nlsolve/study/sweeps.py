@@ -123,12 +123,18 @@ class Sweep(BaseModel):
 
 
 def assign_all(document: Document, values: Mapping[str, Any]) -> list[Problem]:
-    """Set values in a document by dotted name; a problem for each name that leads through a value that is no table."""
+    """Set values in a document by dotted name; a problem for each name that leads through a value that is no table.
+
+    A word inside a section is short for a table with that kind: over range = "ratio", solver.range.most = 2.0 sets
+    range = { kind = "ratio", most = 2.0 }.
+    """
     problems = []
     for name, value in values.items():
         *parents, last = name.split(".")
         table = document
         for depth, part in enumerate(parents):
+            if depth and isinstance(table.get(part), str):
+                table[part] = {"kind": table[part]}
             table = table.setdefault(part, {})
             if not isinstance(table, dict):
                 above = ".".join(parents[: depth + 1])
@@ -142,13 +148,14 @@ def assign_all(document: Document, values: Mapping[str, Any]) -> list[Problem]:
 def merged(old: Any, new: Any) -> Any:
     """`new` merged over `old`: a component, or a table with a `kind`, replaces `old`; other tables are merged into it.
 
-    A component becomes a table that remembers its class, so that its fields can be set one by one.
+    A component becomes a table that remembers its class, so that its fields can be set one by one. A table without a
+    kind is merged into a word as into the table with that kind.
     """
     if isinstance(new, Component):
         new = table_of(new)
     if isinstance(new, Mapping):
         whole = isinstance(new, ComponentTable) or "kind" in new
-        under = old if isinstance(old, dict) and not whole else {}
+        under = {} if whole else {"kind": old} if isinstance(old, str) else old if isinstance(old, dict) else {}
         table = {**under, **{name: merged(under.get(name), value) for name, value in new.items()}}
         origin = new if whole else under
         return ComponentTable(origin.cls, table) if isinstance(origin, ComponentTable) else table

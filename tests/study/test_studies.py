@@ -13,7 +13,7 @@ from nlsolve.registry.problems import MOVED, StudyError
 from nlsolve.registry.toml_lines import lines_of, nearest_line
 from nlsolve.study.case import Composer
 from nlsolve.study.study import Frame, Study
-from nlsolve.study.sweeps import parse_assignments
+from nlsolve.study.sweeps import assign_all, merged, parse_assignments
 
 REGISTRY = registry_of()
 
@@ -556,6 +556,22 @@ k = 2
 
 
 class TestAssignments:
+    @pytest.mark.parametrize("sweep", [[], [{"grid": {"solver.range": ["ratio", "last-term"]}}]])
+    def test_a_word_is_short_for_a_table_with_that_kind(self, sweep):
+        solver = {"kind": "anm", "range": "ratio"}
+        document = {"question": "q", "scene": {"kind": "bratu", "nodes": 4}, "solver": solver, "sweep": sweep}
+        (case,) = Study.from_dict(document, {"solver.range.kind": "pade-pair"}).cases
+        assert case.parameters["solver.range.kind"] == "pade-pair"
+        with pytest.raises(StudyError, match=r"study, --set: solver.range.part = 2: no such field"):
+            Study.from_dict(document, {"solver.range.part": 2})
+        quick = {"solver": {"range": {"kind": "nearest-pole"}, "order": 5}}
+        (case,) = Study.from_dict(document | {"sweep": [], "quick": quick}, quick=True).cases
+        assert case.parameters["solver.range.kind"] == "nearest-pole"
+        filled = {"solver": {"range": "half"}}
+        assert assign_all(filled, {"solver.range.part": 0.1}) == []
+        assert filled == {"solver": {"range": {"kind": "half", "part": 0.1}}}
+        assert merged("half", {"part": 0.1}) == {"kind": "half", "part": 0.1}
+
     def test_values_are_toml_or_else_text(self):
         parsed = parse_assignments(["a.b=1e-3", "c = true", "d=spin", 'e={ kind = "x" }', "f=a=b"])
         assert parsed == {"a.b": 1e-3, "c": True, "d": "spin", "e": {"kind": "x"}, "f": "a=b"}
