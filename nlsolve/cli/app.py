@@ -15,6 +15,7 @@ import typer
 from pydantic_core import to_jsonable_python
 from rich.console import Console
 
+from nlsolve.cli.disabling import disable
 from nlsolve.cli.printing import (
     count,
     left_out,
@@ -26,8 +27,9 @@ from nlsolve.cli.printing import (
     say_endings,
 )
 from nlsolve.cli.progress import Watch
+from nlsolve.registry.plugin_files import with_files
 from nlsolve.registry.problems import StudyError, did_you_mean
-from nlsolve.registry.registry import load_registry
+from nlsolve.registry.registry import Registry, load_registry
 from nlsolve.results.frames import json_rows
 from nlsolve.running.diagnose import diagnose as diagnostics_of
 from nlsolve.running.forecast import ASSUMPTION, forecast
@@ -57,6 +59,14 @@ Settings = Annotated[
     list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="set a parameter, such as solver.order=20")
 ]
 Quick = Annotated[bool, typer.Option("--quick", help="the shrunk study of the file's [quick] section")]
+PluginFiles = Annotated[
+    list[Path] | None,
+    typer.Option("--plugin", metavar="FILE", help="a plugin of one file, beside those that the study names"),
+]
+Disabled = Annotated[
+    list[str] | None,
+    typer.Option("--disable-plugin", metavar="NAME", help="a plugin, or a package of plugins, that is not imported"),
+]
 Json = Annotated[bool, typer.Option("--json", help="machine-readable output")]
 
 
@@ -84,13 +94,16 @@ def run(
     ] = None,
     settings: Settings = None,
     quick: Quick = False,
+    plugin: PluginFiles = None,
+    disable_plugin: Disabled = None,
     as_json: Json = False,
 ) -> None:
     """Run a study, or the part of it that is not yet in the results folder."""
     folder = out or Path("results") / (study.stem + ("-quick" if quick else ""))
     console = Console(stderr=True)
     with ending(folder):
-        checked = Study.from_toml(study, parse_assignments(settings or []), quick)
+        registry = registry_of(plugin, disable_plugin)
+        checked = Study.from_toml(study, parse_assignments(settings or []), quick, registry)
         with Watch(console) as watch:
             results = run_study(checked, folder, listen=watch)
     print_results(results, as_json)
@@ -102,12 +115,18 @@ def run(
 
 
 @app.command()
-def validate(study: StudyFile, settings: Settings = None, as_json: Json = False) -> None:
+def validate(
+    study: StudyFile,
+    settings: Settings = None,
+    plugin: PluginFiles = None,
+    disable_plugin: Disabled = None,
+    as_json: Json = False,
+) -> None:
     """Check a study, and its quick form if it has one, without running it."""
     with ending():
-        overrides = parse_assignments(settings or [])
-        checked = Study.from_toml(study, overrides)
-        quick = Study.from_toml(study, overrides, quick=True) if checked.has_quick else None
+        overrides, registry = parse_assignments(settings or []), registry_of(plugin, disable_plugin)
+        checked = Study.from_toml(study, overrides, registry=registry)
+        quick = Study.from_toml(study, overrides, quick=True, registry=registry) if checked.has_quick else None
     found = {"study": checked.name, "question": checked.question, "cases": len(checked.cases)}
     found |= {"quick_cases": len(quick.cases)} if quick else {}
     if as_json:
@@ -118,10 +137,18 @@ def validate(study: StudyFile, settings: Settings = None, as_json: Json = False)
 
 
 @app.command()
-def plan(study: StudyFile, settings: Settings = None, quick: Quick = False, as_json: Json = False) -> None:
+def plan(
+    study: StudyFile,
+    settings: Settings = None,
+    quick: Quick = False,
+    plugin: PluginFiles = None,
+    disable_plugin: Disabled = None,
+    as_json: Json = False,
+) -> None:
     """List the cases of a study and forecast what they cost."""
     with ending():
-        checked = Study.from_toml(study, parse_assignments(settings or []), quick)
+        registry = registry_of(plugin, disable_plugin)
+        checked = Study.from_toml(study, parse_assignments(settings or []), quick, registry)
         frame = forecast(checked)
     if as_json:
         typer.echo(json.dumps({"assumption": ASSUMPTION, "cases": json_rows(frame)}))
@@ -133,10 +160,18 @@ def plan(study: StudyFile, settings: Settings = None, quick: Quick = False, as_j
 
 
 @app.command()
-def diagnose(study: StudyFile, settings: Settings = None, quick: Quick = False, as_json: Json = False) -> None:
+def diagnose(
+    study: StudyFile,
+    settings: Settings = None,
+    quick: Quick = False,
+    plugin: PluginFiles = None,
+    disable_plugin: Disabled = None,
+    as_json: Json = False,
+) -> None:
     """Measure the operators on the clouds of a study: supports, balance, reproduction, largest weight."""
     with ending():
-        frame = diagnostics_of(Study.from_toml(study, parse_assignments(settings or []), quick))
+        registry = registry_of(plugin, disable_plugin)
+        frame = diagnostics_of(Study.from_toml(study, parse_assignments(settings or []), quick, registry))
     if as_json:
         typer.echo(json.dumps(json_rows(frame)))
     else:
@@ -144,9 +179,10 @@ def diagnose(study: StudyFile, settings: Settings = None, quick: Quick = False, 
 
 
 @app.command()
-def plugins(as_json: Json = False) -> None:
+def plugins(plugin: PluginFiles = None, disable_plugin: Disabled = None, as_json: Json = False) -> None:
     """List the sections of a study and what is installed for them, with parameters, and what failed to load."""
-    registry = load_registry()
+    with ending():
+        registry = registry_of(plugin, disable_plugin)
     rows = [*section_rows(registry), *registry.plugins()]
     if as_json:
         typer.echo(json.dumps(to_jsonable_python([asdict(row) for row in rows])))
@@ -172,6 +208,12 @@ def table(
         return
     for declared in tables:
         print_table(declared)
+
+
+def registry_of(files: list[Path] | None, disabled: list[str] | None) -> Registry:
+    """The installed plugins but those disabled, and those of files. Raises StudyError for one that cannot be used."""
+    disable(disabled or [])
+    return with_files(load_registry(), files or [])
 
 
 @contextmanager

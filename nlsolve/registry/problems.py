@@ -13,7 +13,7 @@ from nlsolve.contracts.component import Component
 from nlsolve.contracts.status import InputError
 from nlsolve.registry.component_tables import ComponentTable
 from nlsolve.registry.registry import CONTRACTS, registry_in_use
-from nlsolve.registry.toml_lines import Place, nearest_line
+from nlsolve.registry.toml_lines import Place, nearest_place
 
 LONGEST_VALUE = 60
 """Longest offending value that a sentence repeats, in characters."""
@@ -70,18 +70,20 @@ class Source:
     """Where the parts of a document were written.
 
     file : name of the study file, or of the caller that gave the document.
-    lines : line of each place in the file.
+    lines : line of each place in its file.
+    files : the file of each place that is written in another one, which this study extends.
     aliases : dotted names that were last set elsewhere (in a sweep, [quick] or --set), and where they were set.
     """
 
     file: str
-    lines: dict[Place, int] = field(default_factory=dict)
+    lines: Mapping[Place, int] = field(default_factory=dict)
+    files: Mapping[Place, str] = field(default_factory=dict)
     aliases: Mapping[str, str] = field(default_factory=dict)
 
     def at(self, place: Place) -> str:
         """File and line of a place in the document."""
-        line = nearest_line(self.lines, place)
-        return self.file if line is None else f"{self.file}, line {line}"
+        written = nearest_place(self.lines, place)
+        return self.file if written is None else f"{self.files.get(written, self.file)}, line {self.lines[written]}"
 
     def of(self, place: Place) -> str:
         """Where the value at a place was set last: in a sweep, [quick] or --set, or on a line of the file."""
@@ -140,7 +142,7 @@ def problems_in(error: ValidationError, model: type[BaseModel], document: Any) -
 
 def _problem(detail: Mapping[str, Any], model: type[BaseModel], document: Any) -> Problem:
     kind, value, context = detail["type"], detail["input"], detail.get("ctx", {})
-    place = _place_in(document, detail["loc"], missing=kind == "missing")
+    place = _place_in(document, detail["loc"], missing=kind in ("missing", "kind_missing", "kind_unknown"))
     if kind == "extra_forbidden":
         names = [name for name in _fields_at(model, place[:-1], document) if name != place[-1]]
         return unknown(place, value, "no such field", names)

@@ -8,7 +8,8 @@ several packages offer is the first-party one; without that, a study asks for on
 from __future__ import annotations
 
 import inspect
-from collections.abc import Iterable, Iterator, Mapping
+import os
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from contextvars import ContextVar
 from copy import copy
@@ -16,6 +17,7 @@ from dataclasses import dataclass
 from difflib import get_close_matches
 from functools import cache
 from importlib.metadata import EntryPoint, entry_points
+from pathlib import Path
 from typing import Annotated, Any, Union, get_args
 
 import pluggy
@@ -62,6 +64,11 @@ FIRST_PARTY = "nlsolve"
 
 QUALIFIED = ":"
 """Stands between a package and a kind of it: `my-package:newton`."""
+
+DISABLE = "NLSOLVE_DISABLE_PLUGINS"
+"""Environment variable with the names of plugins, or packages of plugins, not to be imported: `first,second`."""
+
+DISABLED = "disabled"
 
 RENAMED_KINDS = {("scene", "system"): "published"}
 """Kinds of older study files, by noun, and what they are called now."""
@@ -115,22 +122,30 @@ class Registry:
         self._offers: dict[tuple[str, str], list[_Offer]] = {}
         self._failures: list[PluginRow] = []
         self._usable: dict[str, dict[str, type[Component]]] = {}
+        self._disabled: list[PluginRow] = []
+        self.files: tuple[Path, ...] = ()
 
     @classmethod
-    def installed(cls) -> Registry:
-        """A registry of all plugins in the entry-point group, loaded in the order of their names."""
+    def installed(cls, disabled: Collection[str] = ()) -> Registry:
+        """A registry of the plugins in the entry-point group, loaded in the order of their names.
+
+        disabled : names of plugins, or of packages of plugins, that are not imported.
+        """
         registry = cls()
-        for entry in sorted(entry_points(group=hookspecs.PROJECT), key=lambda entry: (entry.name, entry.value)):
-            registry.load(entry)
+        for entry in installed_plugins():
+            if disabled and not names_of(entry).isdisjoint(disabled):
+                registry._disabled.append(PluginRow("", "", source_of(entry), failure=DISABLED))
+            else:
+                registry.load(entry)
         return registry
 
     def load(self, entry: EntryPoint) -> None:
         """Import the plugin of one entry point and register it; a failure becomes a row."""
-        source = f"{entry.dist.name} {entry.dist.version} ({entry.value})" if entry.dist else entry.value
+        source = source_of(entry)
         try:
             plugin = entry.load()
         except Exception as error:  # a stranger's import may raise anything; the rest must still work
-            self._fail(source, f"the plugin {entry.name!r} cannot be imported: {_sentence(error)}")
+            self._fail(source, f"the plugin {entry.name!r} cannot be imported: {sentence_of(error)}")
         else:
             self.add(plugin, source)
 
@@ -142,7 +157,7 @@ class Registry:
         try:
             offered = self._offered_by(plugin)
         except Exception as error:  # as above: a stranger's hook
-            self._fail(source, f"the plugin cannot be registered: {_sentence(error)}")
+            self._fail(source, f"the plugin cannot be registered: {sentence_of(error)}")
             return
         self.offer(offered, source)
 
@@ -153,11 +168,15 @@ class Registry:
             self._offers.setdefault((cls.noun, cls.kind_name()), []).append(offer)
         self._usable.clear()
 
-    def with_(self, classes: Iterable[type[Component]], source: str) -> Registry:
-        """A registry that has these classes as well."""
+    def with_(self, classes: Iterable[type[Component]], source: str, file: Path) -> Registry:
+        """A registry that has the classes of a file as well; `files` are all such files.
+
+        Raises TypeError for a class that no study can ask for.
+        """
         wider = copy(self)
         wider._offers = {name: list(offers) for name, offers in self._offers.items()}
         wider._usable = {}
+        wider.files = (*self.files, file)
         wider.offer(classes, source)
         return wider
 
@@ -240,6 +259,7 @@ class Registry:
         if isinstance(kind, str) and (noun, kind) in RENAMED_KINDS:
             return f"this kind is called {RENAMED_KINDS[noun, kind]!r} now"
         failed = f"; {len(self._failures)} plugin(s) failed, see `nlsolve plugins`" if self._failures else ""
+        failed += f"; {len(self._disabled)} plugin(s) disabled" if self._disabled else ""
         if isinstance(kind, str) and QUALIFIED in kind:
             provider, _, bare = kind.rpartition(QUALIFIED)
             others = [offer.name for offer in self._offers.get((noun, bare), [])]
@@ -328,7 +348,7 @@ class Registry:
                 name = kind if self._chosen(noun, kind) == [offer] else offer.name
                 failure = self.complaint(noun, name)
                 rows.append(PluginRow(noun, name, offer.source, parameters_of(offer.cls), failure))
-        return rows + self._failures
+        return rows + self._failures + self._disabled
 
     @contextmanager
     def in_use(self) -> Iterator[None]:
@@ -340,10 +360,30 @@ class Registry:
             _IN_USE.reset(before)
 
 
-@cache
 def load_registry() -> Registry:
-    """The registry of the installed plugins, loaded at the first call in a process."""
-    return Registry.installed()
+    """The registry of the installed plugins, without those that the environment variable `DISABLE` names; loaded at
+    the first call in a process."""
+    return _installed(frozenset(filter(None, os.environ.get(DISABLE, "").split(","))))
+
+
+@cache
+def _installed(disabled: frozenset[str]) -> Registry:
+    return Registry.installed(disabled)
+
+
+def installed_plugins() -> list[EntryPoint]:
+    """The entry points of all installed plugins, in the order of their names."""
+    return sorted(entry_points(group=hookspecs.PROJECT), key=lambda entry: (entry.name, entry.value))
+
+
+def names_of(entry: EntryPoint) -> set[str]:
+    """The names by which a plugin is disabled: its own, and that of its package."""
+    return {entry.name} | ({entry.dist.name} if entry.dist else set())
+
+
+def source_of(entry: EntryPoint) -> str:
+    """Package, version and module of a plugin."""
+    return f"{entry.dist.name} {entry.dist.version} ({entry.value})" if entry.dist else entry.value
 
 
 _IN_USE: ContextVar[Registry | None] = ContextVar("registry in use", default=None)
@@ -383,6 +423,6 @@ def _parameter(name: str, info: FieldInfo) -> Parameter:
     return Parameter(name, words, "required" if info.is_required() else default, info.description or "")
 
 
-def _sentence(error: BaseException) -> str:
+def sentence_of(error: BaseException) -> str:
     """Exception type and the first line of its text."""
     return f"{type(error).__name__}: {str(error).strip()}".splitlines()[0]

@@ -138,6 +138,8 @@ class Composer:
                 )
             if default is not None:
                 _complete(document, name, default)
+            elif not (_has_kinds(section) or any(f.is_required() for f in section.contract.model_fields.values())):
+                document.setdefault(name, {})
         model = self.model(scene, sections)
         keys = None if self._holds_instances else keys_of(document, model.model_fields)
         found = None if keys is None else self._known.get(scene, keys)
@@ -156,12 +158,10 @@ class Composer:
         if scene not in self._models:
             fields: dict[str, Any] = {Scene.noun: (self.registry.union(Scene.noun), ...)}
             for name, section in sections.items():
-                if CONTRACTS.get(section.contract.noun) is section.contract:
+                if _has_kinds(section):
                     fields[name] = (self.registry.union(section.contract.noun), None if section.of else ...)
-                elif any(field.is_required() for field in section.contract.model_fields.values()):
-                    fields[name] = (section.contract, ...)
                 else:
-                    fields[name] = (section.contract, section.contract())
+                    fields[name] = (section.contract, ...)
             config = ConfigDict(extra="forbid", frozen=True)
             self._models[scene] = create_model("Parts", __config__=config, **fields)
         return self._models[scene]
@@ -234,6 +234,10 @@ def section_rows(registry: Registry) -> list[PluginRow]:
         for name, section in found.items()
         if name in askers and section.contract not in CONTRACTS.values()
     ]
+
+
+def _has_kinds(section: Section) -> bool:
+    return CONTRACTS.get(section.contract.noun) is section.contract
 
 
 def _plain(value: Any) -> Any:

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import itertools
-import re
-import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -12,15 +10,17 @@ from typing import Any
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
+from nlsolve.registry.plugin_files import with_files
 from nlsolve.registry.problems import ABSENT, Problem, Source, StudyError, problems_in, unknown
 from nlsolve.registry.registry import Registry, load_registry
-from nlsolve.registry.toml_lines import Place, lines_of
+from nlsolve.registry.toml_lines import Place
 from nlsolve.results.columns import RUNS, is_measured, no_such_column
 from nlsolve.results.parameters import VARIANT, names_settings
 from nlsolve.results.reference_error import REFERENCE
 from nlsolve.show.figures import FigureSpec
 from nlsolve.show.tables import TableSpec, check
 from nlsolve.study.case import Case, Composer, Invalid
+from nlsolve.study.documents import EXTENDS, PLUGINS, read_document
 from nlsolve.study.sweeps import Document, Point, Setting, Sweep, assign_all, leaves, merged, places_of, swept_places
 from nlsolve.study.timing import Timing
 
@@ -30,6 +30,14 @@ class Frame(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
+    extends: str | None = Field(
+        None,
+        description="path of a study, relative to this file, over whose entries those of this file are merged: tables "
+        "key by key, while a table with a kind, a list and any other value replace what was there",
+    )
+    plugins: tuple[str, ...] = Field(
+        (), description="plugins of one file, by their paths relative to this file; all their components can be used"
+    )
     question: str = Field(min_length=1, description="what the study finds out, in a sentence")
     sweep: tuple[Sweep, ...] = ()
     reference: dict[str, Any] | None = Field(
@@ -46,6 +54,7 @@ class Study:
     """A question, the cases that answer it, and the tables and figures to show.
 
     has_quick : whether the study has a [quick] section, which `quick=True` and --quick apply.
+    plugins : the files of plugins without installation whose components its cases may have.
     """
 
     name: str
@@ -55,6 +64,7 @@ class Study:
     figures: tuple[Any, ...] = ()
     has_quick: bool = False
     timing: Timing = field(default_factory=Timing)
+    plugins: tuple[Path, ...] = ()
 
     @classmethod
     def from_toml(
@@ -69,16 +79,7 @@ class Study:
 
         Raises StudyError with a sentence for each mistake: its line, its place, its value, and what is expected.
         """
-        try:
-            text = Path(path).read_text(encoding="utf-8")
-            document = tomllib.loads(text)
-        except OSError as error:
-            raise StudyError(f"{path}: the study cannot be read: {error.strerror}") from error
-        except UnicodeDecodeError as error:
-            raise StudyError(f"{path}: the study is not UTF-8 text: {error.reason}") from error
-        except tomllib.TOMLDecodeError as error:
-            raise StudyError(_syntax(str(path), str(error))) from error
-        source = Source(str(path), lines_of(text))
+        document, source = read_document(Path(path))
         return _built(source, document, overrides or {}, quick, registry or load_registry(), Path(path).stem)
 
     @classmethod
@@ -106,6 +107,12 @@ def _built(
     name: str,
 ) -> Study:
     """The study of a document, in which components inside components are those of the same registry."""
+    paths = document.get(PLUGINS, [])
+    for number, path in enumerate(paths if isinstance(paths, list | tuple) else []):
+        try:
+            registry = with_files(registry, [Path(path)] if isinstance(path, str) else [])
+        except StudyError as error:
+            raise StudyError(f"{source.at((PLUGINS, number))}: {PLUGINS}[{number}]: {error}") from error
     with registry.in_use():
         return _Builder(source, document, overrides, quick, registry).study(name)
 
@@ -128,7 +135,8 @@ class _Builder:
             aliases |= {name: source.at(("quick", *place)) for name, place in changed.items()}
         self.quick = quick
         self.overrides = {**quick_values, **overrides}
-        self.source = Source(source.file, source.lines, aliases | {name: f"{source.file}, --set" for name in overrides})
+        by_hand = {name: f"{source.file}, --set" for name in overrides}
+        self.source = replace(source, aliases=aliases | by_hand)
         self.refuse(assign_all(self.document, self.overrides))
 
     def study(self, name: str) -> Study:
@@ -156,7 +164,16 @@ class _Builder:
             asked = "a crossover is told from unit costs: set timing = { calibrate = true }"
             problems += [Problem(place, ABSENT, asked) for place in lines]
         self.refuse(problems)
-        return Study(name, frame.question, cases, tuple(tables), frame.figure, bool(frame.quick), frame.timing)
+        return Study(
+            name,
+            frame.question,
+            cases,
+            tuple(tables),
+            frame.figure,
+            has_quick=bool(frame.quick),
+            timing=frame.timing,
+            plugins=self.composer.registry.files,
+        )
 
     def refuse(self, problems: list[Problem]) -> None:
         self.refuse_sentences([problem.sentence(self.source) for problem in problems])
@@ -170,6 +187,9 @@ class _Builder:
         strange = [name for name in document if name not in Frame.model_fields]
         names = [*Frame.model_fields, *self.composer.sections]
         self.refuse([unknown((name,), self.document[name], "no such section", names) for name in strange])
+        if EXTENDS in document:
+            sentence = "a study in a dictionary extends none: merge the dictionaries, or write a study file"
+            self.refuse([Problem((EXTENDS,), document[EXTENDS], sentence)])
         try:
             frame = Frame.model_validate(document)
         except ValidationError as error:
@@ -287,9 +307,3 @@ def _differing(everyone: Sequence[Mapping[str, Any]]) -> set[str]:
             if name not in differing and first.setdefault(name, value) != value:
                 differing.add(name)
     return differing
-
-
-def _syntax(path: str, message: str) -> str:
-    found = re.search(r"\(at line (\d+), column (\d+)\)", message)
-    where = f", line {found[1]}, column {found[2]}" if found else ""
-    return f"{path}{where}: not valid TOML: {message.split(' (at ')[0]}"

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import json
+import os
 from importlib.metadata import version
 
 import pytest
-from fakes import Newton, Plugin, fake_march, registry_of, write_study
+from fakes import STUDY, Newton, Plugin, fake_march, registry_of, write_study
 from typer.testing import CliRunner
 
 from nlsolve.cli.app import app
+from nlsolve.registry.registry import DISABLE, load_registry
 
 BARS = {"FORCE_COLOR": "1", "TERM": "xterm", "COLUMNS": "200"}
 
@@ -217,6 +219,50 @@ def test_many_rows_are_lines_without_rules(tmp_path):
     )
     printed = nlsolve("run", write_study(tmp_path, orders, *tall)).stdout
     assert "branches\nsolver.order  solver.tolerance  tangents\n2             1e-06             " in printed
+
+
+HALF = """
+from typing import Any, Literal
+
+from nlsolve.plugin import NonlinearSolver, Step
+
+
+class Half(NonlinearSolver):
+    kind: Literal["half"] = "half"
+
+    def steps(self, problem: Any, tangent: Any, start: Any) -> Any:
+        yield Step(start)
+"""
+
+
+def test_a_plugin_of_one_file(tmp_path):
+    path = write_study(tmp_path, ('kind = "anm"', 'kind = "half"'), text=STUDY[: STUDY.index("[[sweep]]")])
+    assert nlsolve("validate", path).exit_code == 2
+    (tmp_path / "half.py").write_text(HALF, encoding="utf-8")
+    for command in ("validate", "run"):
+        assert nlsolve(command, path, "--plugin", "half.py").exit_code == 0
+    assert "half (half.py)" in nlsolve("plugins", "--plugin", "half.py").stdout
+    result = nlsolve("plan", path, "--plugin", "nowhere.py")
+    assert (result.exit_code, result.stderr) == (
+        2,
+        "the plugin nowhere.py cannot be read: No such file or directory\n",
+    )
+
+
+def test_a_disabled_plugin(monkeypatch, tmp_path):
+    monkeypatch.setenv(DISABLE, "systems")
+    monkeypatch.setattr("nlsolve.cli.app.load_registry", load_registry)
+    result = nlsolve("plugins", "--disable-plugin", "solvers")
+    assert "nlsolve 0.1.0 (nlsolve_solvers)" in result.stdout
+    assert "disabled" in result.stdout
+    assert "levenberg-marquardt" not in result.stdout
+    assert "bratu" not in result.stdout
+    assert os.environ[DISABLE] == "systems,solvers"
+    result = nlsolve("validate", write_study(tmp_path), "--disable-plugin", "solver")
+    assert (result.exit_code, result.stderr) == (
+        2,
+        "--disable-plugin solver: no such plugin; did you mean 'solvers'?\n",
+    )
 
 
 def test_version():

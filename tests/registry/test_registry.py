@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib.metadata
 import sys
+from pathlib import Path
 from typing import Any, ClassVar, Literal
 
 import pytest
@@ -205,9 +206,10 @@ def test_one_package_that_offers_a_kind_twice():
 
 def test_a_registry_with_more_classes_leaves_the_first_as_it_was():
     registry = registry_of(Newton)
-    wider = registry.with_([Homotopy], "more (more.py)")
+    wider = registry.with_([Homotopy], "more (more.py)", Path("more.py"))
     assert list(registry.classes("solver")) == ["newton"]
     assert list(wider.classes("solver")) == ["anm", "newton"]
+    assert (registry.files, wider.files) == ((), (Path("more.py"),))
     assert wider.class_called("solver", "more:anm") is Homotopy
     assert registry_in_use() is load_registry()
     with wider.in_use():

@@ -10,7 +10,7 @@ import pytest
 from fakes import STUDY, Box, Homotopy, Newton, registry_of, write_study
 
 from nlsolve.registry.problems import MOVED, StudyError
-from nlsolve.registry.toml_lines import lines_of, nearest_line
+from nlsolve.registry.toml_lines import lines_of, nearest_place
 from nlsolve.study.case import Composer
 from nlsolve.study.study import Frame, Study
 from nlsolve.study.sweeps import assign_all, merged, parse_assignments
@@ -551,8 +551,9 @@ k = 2
         assert lines[("list", 0, "k")] == 9
         assert lines[("list", 0, "sub", "m")] == 11
         assert lines[("list", 1, "k")] == 13
-        assert nearest_line(lines, ("list", 1, "absent", "deep")) == 12
-        assert nearest_line(lines, ("absent",)) is None
+        assert nearest_place(lines, ("list", 1, "absent", "deep")) == ("list", 1)
+        assert lines["list", 1] == 12
+        assert nearest_place(lines, ("absent",)) is None
 
 
 class TestAssignments:
