@@ -25,6 +25,7 @@ from nlsolve.cli.printing import (
     print_table,
     say,
     say_endings,
+    say_excluded,
 )
 from nlsolve.cli.progress import Watch
 from nlsolve.registry.plugin_files import with_files
@@ -107,6 +108,7 @@ def run(
         with Watch(console) as watch:
             results = run_study(checked, folder, listen=watch)
     print_results(results, as_json)
+    say_excluded(checked)
     for line in (*left_out(results.runs), *results.notes):
         say(line)
     say_endings(results)
@@ -129,10 +131,12 @@ def validate(
         quick = Study.from_toml(study, overrides, quick=True, registry=registry) if checked.has_quick else None
     found = {"study": checked.name, "question": checked.question, "cases": len(checked.cases)}
     found |= {"quick_cases": len(quick.cases)} if quick else {}
+    found |= {"excluded": [asdict(excluded) for excluded in checked.excluded]} if checked.excluded else {}
     if as_json:
         typer.echo(json.dumps(found))
     else:
         extra = f" ({len(quick.cases)} with --quick)" if quick else ""
+        say_excluded(checked)
         typer.echo(f"{study} is valid: {count(len(checked.cases))}{extra}. {checked.question}")
 
 
@@ -155,6 +159,7 @@ def plan(
         return
     swept = list(dict.fromkeys(name for case in checked.cases for name in case.swept))
     sizes = ["increments", "nodes", "unknowns", "seconds_factorization", "seconds_start", "seconds", "seconds_all"]
+    say_excluded(checked)
     print_frame(count(len(frame)), frame[["case", *swept, *sizes]])
     typer.echo(f"{frame['seconds_all'].sum() * checked.timing.rounds:.3g} s in all ({ASSUMPTION})")
 

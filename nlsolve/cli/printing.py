@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections import Counter
 
 import pandas as pd
 import typer
@@ -16,6 +17,7 @@ from nlsolve.registry.registry import PluginRow
 from nlsolve.results.frames import json_rows
 from nlsolve.running.runner import Results
 from nlsolve.show.tables import Table
+from nlsolve.study.study import Study
 
 MOST_RULED = 500
 """Rows up to which a table is printed with rules; ruling ten thousand takes half a minute."""
@@ -32,6 +34,13 @@ def say(sentence: str) -> None:
 def count(cases: int) -> str:
     """1 case, 2 cases"""
     return f"{cases} case{'' if cases == 1 else 's'}"
+
+
+def say_excluded(study: Study) -> None:
+    """Say how many cases a study leaves out, and why."""
+    reasons = Counter(excluded.reason for excluded in study.excluded)
+    for reason, number in reasons.items():
+        say(f"left out: {count(number)}: {reason}")
 
 
 def stdout() -> Console:

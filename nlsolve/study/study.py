@@ -21,6 +21,7 @@ from nlsolve.show.figures import FigureSpec
 from nlsolve.show.tables import TableSpec, check
 from nlsolve.study.case import Case, Composer, Invalid
 from nlsolve.study.documents import EXTENDS, PLUGINS, read_document
+from nlsolve.study.exclusions import Exclude, Excluded, Exclusions
 from nlsolve.study.sweeps import Document, Point, Setting, Sweep, assign_all, leaves, merged, places_of, swept_places
 from nlsolve.study.timing import Timing
 
@@ -40,6 +41,7 @@ class Frame(BaseModel):
     )
     question: str = Field(min_length=1, description="what the study finds out, in a sentence")
     sweep: tuple[Sweep, ...] = ()
+    exclude: tuple[Exclude, ...] = ()
     reference: dict[str, Any] | None = Field(
         None, description="parameters that make a case the reference its velocities are compared with"
     )
@@ -55,6 +57,7 @@ class Study:
 
     has_quick : whether the study has a [quick] section, which `quick=True` and --quick apply.
     plugins : the files of plugins without installation whose components its cases may have.
+    excluded : the cases that the study leaves out.
     """
 
     name: str
@@ -65,6 +68,7 @@ class Study:
     has_quick: bool = False
     timing: Timing = field(default_factory=Timing)
     plugins: tuple[Path, ...] = ()
+    excluded: tuple[Excluded, ...] = ()
 
     @classmethod
     def from_toml(
@@ -141,7 +145,7 @@ class _Builder:
 
     def study(self, name: str) -> Study:
         frame = self.frame()
-        cases = self.cases(frame)
+        cases, excluded = self.cases(frame)
         tables, problems = [], []
         for number, spec in enumerate(frame.table):
             found = check(spec, [case.parameters for case in cases])
@@ -173,6 +177,7 @@ class _Builder:
             has_quick=bool(frame.quick),
             timing=frame.timing,
             plugins=self.composer.registry.files,
+            excluded=excluded,
         )
 
     def refuse(self, problems: list[Problem]) -> None:
@@ -206,7 +211,8 @@ class _Builder:
         )
         return frame
 
-    def cases(self, frame: Frame) -> tuple[Case, ...]:
+    def cases(self, frame: Frame) -> tuple[tuple[Case, ...], tuple[Excluded, ...]]:
+        exclusions, known = Exclusions(frame.exclude), set[str]()
         cases: dict[str, Case] = {}
         references: dict[str, Case] = {}
         sentences: list[str] = []
@@ -217,12 +223,19 @@ class _Builder:
         }
         root: Place = ("quick", "sweep") if self.quick and "sweep" in self.document["quick"] else ("sweep",)
         for points in itertools.product(*(sweep.points((*root, number)) for number, sweep in enumerate(frame.sweep))):
+            label = ", ".join(point.label for point in points)
             try:
                 case = self.combined(base, points, by_hand, named)
+                known |= case.parameters.keys()
+                if exclusions.hit(case.parameters, label):
+                    continue
                 if frame.reference is not None:
                     reference = self.reference(frame.reference, base, points, by_hand, named)
                     case = replace(case, reference=references.setdefault(reference.id, reference).id)
             except _Refused as refused:
+                known |= refused.parameters.keys()
+                if exclusions.hit(refused.parameters, label):
+                    continue
                 sentences += refused.sentences
                 continue
             twin = cases.setdefault(case.id, case)  # overrides may make two cases one
@@ -232,11 +245,16 @@ class _Builder:
                 place = next(point.place for point in points if point.name)
                 sentences.append(Problem(place, ABSENT, same).sentence(self.source_of(points, named, by_hand)))
         self.refuse_sentences(sentences)
+        if not self.overrides:  # a study that is changed by hand or by [quick] may have fewer cases
+            self.refuse(exclusions.idle(known))
+        if not cases:
+            self.refuse([Problem(("exclude",), ABSENT, "no case is left")])
         cases = references | cases  # references first: the other cases are compared with them as they end
         differing = _differing([case.parameters for case in cases.values()])
-        return tuple(
+        shown = (
             replace(case, swept=tuple(name for name in case.swept if name in differing)) for case in cases.values()
         )
+        return tuple(shown), tuple(exclusions.found)
 
     def combined(self, base: Document, points: tuple[Point, ...], by_hand: Mapping[str, Any], named: set[str]) -> Case:
         """The case of one combination of points; overrides replace their values. Raises _Refused with sentences."""
@@ -250,7 +268,9 @@ class _Builder:
             return self.composer.case(document, points)
         except Invalid as invalid:
             source = self.source_of(points, named, by_hand)
-            raise _Refused([problem.sentence(source) for problem in invalid.problems]) from invalid
+            settings = {point.column: point.name for point in points if point.name}
+            sentences = [problem.sentence(source) for problem in invalid.problems]
+            raise _Refused(sentences, {**settings, **_written(document)}) from invalid
 
     def reference(
         self,
@@ -285,11 +305,21 @@ class _Builder:
 
 
 class _Refused(Exception):
-    """Raised for a combination that does not make a case; `sentences` say why, each with its place."""
+    """Raised for a combination that does not make a case.
 
-    def __init__(self, sentences: list[str]) -> None:
+    sentences : why, each with its place.
+    parameters : the values that were written, by dotted name.
+    """
+
+    def __init__(self, sentences: list[str], parameters: Mapping[str, Any]) -> None:
         super().__init__()
-        self.sentences = sentences
+        self.sentences, self.parameters = sentences, parameters
+
+
+def _written(document: Document) -> dict[str, Any]:
+    """The values of a document by dotted name; a word may be short for a table with that kind."""
+    written = dict(leaves(document))
+    return {f"{name}.kind": value for name, value in written.items() if isinstance(value, str)} | written
 
 
 def _settings_of(case: Case) -> str:

@@ -345,7 +345,9 @@ class TestComplaints:
 
     def test_sweep_without_values_or_with_two_modes(self, tmp_path):
         assert "'solver.order' has no values" in complaint(tmp_path, ("[10, 20]", "[]"))
-        assert "a sweep has one of grid, zip and each" in complaint(tmp_path, ("[[table]]", "[[sweep]]\n[[table]]"))
+        assert "a sweep has one of grid, zip, each and repeat" in complaint(
+            tmp_path, ("[[table]]", "[[sweep]]\n[[table]]")
+        )
 
     def test_claim_needs_a_solver_that_claims(self, tmp_path):
         assert read(tmp_path, ("[solver]", '[stop]\nkind = "claim"\n[solver]')).cases[0].parts.stop.kind == "claim"
