@@ -48,6 +48,7 @@ class ExitCode(IntEnum):
     COMPLETE = 0
     CRASHED = 1
     INVALID = 2
+    NOT_FOUND = 3
     INTERRUPTED = 130
 
 
@@ -111,9 +112,13 @@ def run(
     say_excluded(checked)
     for line in (*left_out(results.runs), *results.notes):
         say(line)
+    for finding in results.findings:
+        say(str(finding))
     say_endings(results)
     if results.crashed:
         raise typer.Exit(ExitCode.CRASHED)
+    if not all(finding.holds for finding in results.findings):
+        raise typer.Exit(ExitCode.NOT_FOUND)
 
 
 @app.command()

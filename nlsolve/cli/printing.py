@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections import Counter
+from dataclasses import asdict
 
 import pandas as pd
 import typer
@@ -85,7 +86,8 @@ def print_results(results: Results, as_json: bool) -> None:
     if as_json:
         shown = {table.spec.name: table.long() for table in tables}
         document = {"study": results.study.name, "folder": str(results.folder), "runs": json_rows(results.runs)}
-        typer.echo(json.dumps(document | {"tables": shown, "notes": list(results.notes)}))
+        findings = [asdict(finding) for finding in results.findings]
+        typer.echo(json.dumps(document | {"tables": shown, "notes": list(results.notes), "findings": findings}))
         return
     for declared in tables:
         print_table(declared)

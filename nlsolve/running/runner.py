@@ -20,6 +20,7 @@ from nlsolve.results.reference_error import with_reference_errors
 from nlsolve.results.verdicts import number
 from nlsolve.running.store import Part, Store, merge
 from nlsolve.running.timing import CLOCKS, measure
+from nlsolve.show.expectations import Finding, judged
 from nlsolve.show.figures import FigureError, draw, save
 from nlsolve.show.report import write_report
 from nlsolve.show.tables import Table, build
@@ -72,6 +73,11 @@ class Results:
     def crashed(self) -> int:
         """How many cases stopped on an error in the program or in a plugin."""
         return int((self.runs["status"] == Status.CRASHED.word).sum())
+
+    @property
+    def findings(self) -> tuple[Finding, ...]:
+        """What the study expects to find, and whether these runs bear it out."""
+        return judged(self.study.expectations, self.study.tables, self.runs)
 
     def tables(self) -> list[Table]:
         """The declared tables that these runs can fill; the others are in `notes`."""

@@ -17,6 +17,7 @@ from nlsolve.registry.toml_lines import Place
 from nlsolve.results.columns import RUNS, is_measured, no_such_column
 from nlsolve.results.parameters import VARIANT, names_settings
 from nlsolve.results.reference_error import REFERENCE
+from nlsolve.show.expectations import Expectation
 from nlsolve.show.figures import FigureSpec
 from nlsolve.show.tables import TableSpec, check
 from nlsolve.study.case import Case, Composer, Invalid
@@ -47,6 +48,7 @@ class Frame(BaseModel):
     )
     table: tuple[TableSpec, ...] = ()
     figure: tuple[FigureSpec, ...] = ()
+    expect: tuple[Expectation, ...] = ()
     timing: Timing = Timing()
     quick: dict[str, Any] = Field(default_factory=dict, description="what --quick changes")
 
@@ -58,6 +60,7 @@ class Study:
     has_quick : whether the study has a [quick] section, which `quick=True` and --quick apply.
     plugins : the files of plugins without installation whose components its cases may have.
     excluded : the cases that the study leaves out.
+    expectations : what the study asserts of its results; of a quick study, what its [quick] section asserts.
     """
 
     name: str
@@ -69,6 +72,7 @@ class Study:
     timing: Timing = field(default_factory=Timing)
     plugins: tuple[Path, ...] = ()
     excluded: tuple[Excluded, ...] = ()
+    expectations: tuple[Expectation, ...] = ()
 
     @classmethod
     def from_toml(
@@ -162,6 +166,13 @@ class _Builder:
             for column in columns
             if column not in known and not is_measured(column)
         ]
+        expectations = frame.expect if not self.quick or "expect" in self.document["quick"] else ()
+        names = [spec.name for spec in frame.table]
+        problems += [
+            Problem(("expect", number, *wrong.place), wrong.value, wrong.expected)
+            for number, expectation in enumerate(expectations)
+            for wrong in expectation.problems(known, names)
+        ]
         if not frame.timing.calibrate:
             lines = [("table", n) for n, spec in enumerate(frame.table) if spec.crossover is not None]
             lines += [("figure", n) for n, spec in enumerate(frame.figure) if spec.kind == "crossover"]
@@ -178,6 +189,7 @@ class _Builder:
             timing=frame.timing,
             plugins=self.composer.registry.files,
             excluded=excluded,
+            expectations=expectations,
         )
 
     def refuse(self, problems: list[Problem]) -> None:

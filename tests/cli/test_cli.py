@@ -221,6 +221,45 @@ def test_many_rows_are_lines_without_rules(tmp_path):
     assert "branches\nsolver.order  solver.tolerance  tangents\n2             1e-06             " in printed
 
 
+EXPECT = """
+[[expect]]
+that = "Order 20 needs few tangents."
+column = "tangents"
+where = { "solver.order" = 20 }
+at_most = 40
+[[expect]]
+table = "branches"
+column = "solver.tolerance = 1e-06"
+by = "solver.order"
+order = [20, 10]
+[quick]"""
+
+
+def test_findings_are_judged_and_3_says_that_one_does_not_hold(tmp_path):
+    result = nlsolve("run", write_study(tmp_path, ("\n[quick]", EXPECT)))
+    assert result.exit_code == 0
+    assert "found, as expected: Order 20 needs few tangents.\n" in result.stderr
+    wrong = ("at_most = 40", "at_most = 39")
+    path = write_study(tmp_path, ("\n[quick]", EXPECT), wrong)
+    result = nlsolve("run", path)
+    assert result.exit_code == 3
+    assert "not found, though expected: Order 20 needs few tangents.: case " in result.stderr
+    findings = json.loads(nlsolve("run", path, "--json").stdout)["findings"]
+    assert [bool(finding["refutation"]) for finding in findings] == [True, False]
+    assert nlsolve("run", path, "--quick").exit_code == 0
+    quick = ("sweep = [{", 'expect = [{ column = "tangents", at_most = 0 }]\nsweep = [{')
+    assert nlsolve("run", write_study(tmp_path, quick), "--quick").exit_code == 3
+
+
+def test_what_is_left_out_is_said(tmp_path):
+    rule = '[[exclude]]\nwhere = { "solver.order" = 20 }\nreason = "it takes a day"\n[quick]'
+    path = write_study(tmp_path, ("[quick]", rule))
+    for command in ("validate", "plan", "run"):
+        assert "left out: 2 cases: it takes a day\n" in nlsolve(command, path).stderr
+    excluded = json.loads(nlsolve("validate", path, "--json").stdout)["excluded"]
+    assert excluded[0] == {"label": "solver.order = 20, solver.tolerance = 1e-06", "reason": "it takes a day"}
+
+
 HALF = """
 from typing import Any, Literal
 

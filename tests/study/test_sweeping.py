@@ -125,6 +125,36 @@ class TestRepeat:
 SWEEP = '[[sweep]]\ngrid = { "solver.order" = [10, 20], "solver.tolerance" = [1e-6, 1e-8] }\n'
 
 
+class TestExpect:
+    @pytest.mark.parametrize(
+        ("rule", "sentence"),
+        [
+            ("at_most = 1", "line 17: expect[0].column: required, and missing"),
+            ('column = "tangents"', "line 17: expect[0]"),
+            ('column = "tangnts"\nat_most = 1', "line 18: expect[0].column = 'tangnts': no such column of the results"),
+            (
+                'column = "tangents"\nat_most = 1\nwhere = { "solver.ordr" = 1 }',
+                "line 20: expect[0].where = 'solver.ordr': no such column of the results; did you mean 'solver.order'?",
+            ),
+            (
+                'column = "tangents"\ntable = "t"\nat_most = 1',
+                "line 19: expect[0].table = 't': no such table; there are none",
+            ),
+            ('column = "tangents"\nat_most = "x"', "line 19: expect[0].at_most = 'x': should be a valid number"),
+            ('column = "tangents"\nat_mst = 1', "line 19: expect[0].at_mst = 1: no such field; did you mean 'at_most'"),
+        ],
+    )
+    def test_mistakes(self, tmp_path, rule, sentence):
+        assert sentence in told(f"{SWEEP}[[expect]]\n{rule}\n", tmp_path)
+
+    def test_a_quick_study_has_its_own(self):
+        rules = '[[expect]]\ncolumn = "tangents"\nat_most = 1\n[quick]\nsolver.order = 10\n'
+        assert len(study(SWEEP + rules).expectations) == 1
+        assert study(SWEEP + rules, quick=True).expectations == ()
+        own = f'{rules}expect = [{{ column = "tangents", at_most = 5 }}]\n'
+        assert [expected.at_most for expected in study(SWEEP + own, quick=True).expectations] == [5.0]
+
+
 class TestExclude:
     def test_cases_are_left_out_with_a_reason(self):
         rule = '[[exclude]]\nwhere = { "solver.order" = 20, "solver.tolerance" = [1e-8, 1e-9] }\nreason = "too slow"\n'
