@@ -38,6 +38,7 @@ from nlsolve.running.runner import run as run_study
 from nlsolve.running.store import StoreError, read_tables
 from nlsolve.show.tables import build
 from nlsolve.study.case import section_rows
+from nlsolve.study.keys.schema import study_schema
 from nlsolve.study.study import Study
 from nlsolve.study.sweeps import parse_assignments
 
@@ -198,6 +199,14 @@ def plugins(plugin: PluginFiles = None, disable_plugin: Disabled = None, as_json
         typer.echo(json.dumps(to_jsonable_python([asdict(row) for row in rows])))
         return
     print_plugins(rows)
+
+
+@app.command()
+def schema(plugin: PluginFiles = None, disable_plugin: Disabled = None) -> None:
+    """Print the JSON schema of study files, composed from the installed plugins."""
+    with ending():
+        registry = registry_of(plugin, disable_plugin)
+    typer.echo(json.dumps(study_schema(registry), indent=1, ensure_ascii=False))
 
 
 @app.command()

@@ -219,6 +219,23 @@ class Registry:
             }
         return self._usable[noun]
 
+    def offered(self, noun: str, absent_too: bool = False) -> dict[str, type[Component]]:
+        """The classes of one noun by the kind that asks for each, qualified where the kind alone means another class.
+
+        absent_too : whether classes whose libraries are not installed are among them.
+        """
+        found = {}
+        for row_noun, kind in sorted(self._offers):
+            for offer in self._offers[row_noun, kind] if row_noun == noun else ():
+                name = kind if self._chosen(noun, kind) == [offer] else offer.name
+                if self._chosen(noun, name) == [offer] and (absent_too or offer.cls.absent is None):
+                    found[name] = offer.cls
+        return found
+
+    def qualified(self, noun: str, kind: str) -> list[str]:
+        """The qualified kind of the class that an unqualified kind means; of a qualified one there is no other."""
+        return [offer.name for offer in self._chosen(noun, kind)] if QUALIFIED not in kind else []
+
     def class_called(self, noun: str, kind: str) -> type[Component] | None:
         """The usable class of a kind, qualified or not; None when there is none."""
         if QUALIFIED not in kind:

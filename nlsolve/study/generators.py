@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 from typing import Annotated, Any
 
-from pydantic import BeforeValidator
+from pydantic import BeforeValidator, WithJsonSchema
 
 FORMS = {
     "linspace": "[first, last, count]: numbers, evenly spaced from the first to the last",
@@ -75,5 +75,7 @@ def _is_number(value: Any) -> bool:
     return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
 
 
-Values = Annotated[list[Any], BeforeValidator(generated)]
+Values = Annotated[
+    list[Any], BeforeValidator(generated), WithJsonSchema({"anyOf": [{"type": "array"}, {"type": "object"}]})
+]
 """Values of a swept parameter, listed or generated."""

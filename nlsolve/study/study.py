@@ -41,16 +41,20 @@ class Frame(BaseModel):
         (), description="plugins of one file, by their paths relative to this file; all their components can be used"
     )
     question: str = Field(min_length=1, description="what the study finds out, in a sentence")
-    sweep: tuple[Sweep, ...] = ()
-    exclude: tuple[Exclude, ...] = ()
+    sweep: tuple[Sweep, ...] = Field((), description="what varies between the cases; several sweeps multiply")
+    exclude: tuple[Exclude, ...] = Field((), description="cases that are left out, with reasons")
     reference: dict[str, Any] | None = Field(
         None, description="parameters that make a case the reference its velocities are compared with"
     )
-    table: tuple[TableSpec, ...] = ()
-    figure: tuple[FigureSpec, ...] = ()
-    expect: tuple[Expectation, ...] = ()
-    timing: Timing = Timing()
-    quick: dict[str, Any] = Field(default_factory=dict, description="what --quick changes")
+    table: tuple[TableSpec, ...] = Field((), description="tables of the results")
+    figure: tuple[FigureSpec, ...] = Field((), description="figures of the results")
+    expect: tuple[Expectation, ...] = Field(
+        (), description="findings that the study asserts; exit code 3 of `nlsolve run` says that one does not hold"
+    )
+    timing: Timing = Field(Timing(), description="how the cases are timed")
+    quick: dict[str, Any] = Field(
+        default_factory=dict, description="dotted parameters, and entries such as sweep, that --quick changes"
+    )
 
 
 @dataclass(frozen=True)

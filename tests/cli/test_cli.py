@@ -288,6 +288,17 @@ def test_a_plugin_of_one_file(tmp_path):
     )
 
 
+def test_the_schema_has_what_is_installed(tmp_path):
+    (tmp_path / "half.py").write_text(HALF, encoding="utf-8")
+    document = json.loads(nlsolve("schema", "--plugin", "half.py").stdout)
+    kinds = {
+        kind
+        for part in document["$defs"].values()
+        for kind in part.get("properties", {}).get("kind", {}).get("enum", [])
+    }
+    assert {"box", "anm", "half", "half:half"} <= kinds
+
+
 def test_a_disabled_plugin(monkeypatch, tmp_path):
     monkeypatch.setenv(DISABLE, "systems")
     monkeypatch.setattr("nlsolve.cli.app.load_registry", load_registry)
