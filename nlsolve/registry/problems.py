@@ -21,6 +21,13 @@ LONGEST_VALUE = 60
 ABSENT = object()
 """Stands for a value that is missing, or that the sentence need not repeat."""
 
+MISSING = "required, and missing"
+
+SHAPES = dict.fromkeys(("tuple_type", "list_type"), "should be a list") | dict.fromkeys(
+    ("dict_type", "model_type"), "should be a table"
+)
+"""What is said of a value that is no list or no table, by pydantic's name of the mistake."""
+
 MOVED: dict[str, str] = {
     "counterpart": "error_estimator",
     "starter": "start.solver",
@@ -129,15 +136,19 @@ def unknown(place: Place, value: Any, reason: str, names: Iterable[str]) -> Prob
 def problems_in(error: ValidationError, model: type[BaseModel], document: Any) -> list[Problem]:
     """The mistakes that pydantic found, by the places of the document itself; one for each place."""
     found: dict[Place, Problem] = {}
+    meant: set[Place] = set()  # what a misspelt name stands for is not missing as well
     for detail in error.errors(include_url=False):
         problem = _problem(detail, model, document)
+        if detail["type"] == "extra_forbidden":
+            names = _fields_at(model, problem.place[:-1], document)
+            meant |= {(*problem.place[:-1], name) for name in get_close_matches(str(problem.place[-1]), names, n=1)}
         earlier = found.get(problem.place)
         if earlier is None:
             found[problem.place] = problem
         elif problem.expected not in earlier.expected:  # each member of a union reports a mistake of its own
             both = f"{earlier.expected} or {problem.expected}"
             found[problem.place] = Problem(problem.place, problem.value, both)
-    return list(found.values())
+    return [problem for place, problem in found.items() if place not in meant or problem.expected != MISSING]
 
 
 def _problem(detail: Mapping[str, Any], model: type[BaseModel], document: Any) -> Problem:
@@ -147,18 +158,22 @@ def _problem(detail: Mapping[str, Any], model: type[BaseModel], document: Any) -
         names = [name for name in _fields_at(model, place[:-1], document) if name != place[-1]]
         return unknown(place, value, "no such field", names)
     if kind == "missing":
-        return Problem(place, ABSENT, "required, and missing")
+        return Problem(place, ABSENT, MISSING)
     if kind == "kind_missing":
         return Problem((*place, "kind"), ABSENT, detail["msg"])
     if kind == "kind_unknown" and isinstance(value, Mapping):
         return Problem((*place, "kind"), value["kind"], detail["msg"])
     if kind == "union_tag_not_found":
-        return Problem((*place, "kind"), ABSENT, "required, and missing")
+        return Problem((*place, "kind"), ABSENT, MISSING)
+    if kind in SHAPES:
+        return Problem(place, value, SHAPES[kind])
     if kind == "union_tag_invalid":
         return Problem((*place, "kind"), context["tag"], _choice(context["tag"], context["expected_tags"]))
     if kind == "literal_error":
         return Problem(place, value, _choice(value, context["expected"]))
-    message = detail["msg"].removeprefix("Value error, ").removeprefix("Input ")
+    message = detail["msg"]
+    for beginning in ("Value error, ", "Input ", "String ", "Dictionary "):
+        message = message.removeprefix(beginning)
     return Problem(place, value, message)
 
 

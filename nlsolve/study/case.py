@@ -37,6 +37,9 @@ COMMON: Mapping[str, Section] = {
 
 DIGEST_LETTERS = 12
 
+LARGEST = 2**63 - 1
+"""Largest integer that the columns of results can hold."""
+
 
 @dataclass(frozen=True)
 class Case:
@@ -148,9 +151,19 @@ class Composer:
         try:
             validated = model.model_validate(document)
         except ValidationError as error:
-            raise Invalid(problems_in(error, model, document)) from error
+            problems = problems_in(error, model, document)
+            if scene is Component:  # which other sections are needed is not known
+                problems = [problem for problem in problems if problem.place[0] in (Scene.noun, *document)]
+            raise Invalid(problems) from error
         plain = self.plain(validated)
         found = {name: KnownPart.of(name, getattr(validated, name), plain[name]) for name in model.model_fields}
+        if huge := [
+            Problem(tuple(name.split(".")), value, f"should be an integer of at most {LARGEST} in magnitude")
+            for part in found.values()
+            for name, value in part.parameters.items()
+            if isinstance(value, int) and abs(value) > LARGEST
+        ]:
+            raise Invalid(huge)
         return (found if keys is None else self._known.shared(scene, keys, found)), model
 
     def model(self, scene: type[Component], sections: Mapping[str, Section]) -> type[BaseModel]:

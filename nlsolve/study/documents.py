@@ -47,12 +47,13 @@ def _told(source: Source, value: Any, expected: str) -> str:
 
 def _parsed(path: Path) -> tuple[Document, Source]:
     try:
-        text = path.read_text(encoding="utf-8")
+        text = path.read_text(encoding="utf-8-sig")  # editors put a mark before the first byte
         document = tomllib.loads(text)
     except OSError as error:
         raise StudyError(f"{path}: the study cannot be read: {error.strerror}") from error
     except UnicodeDecodeError as error:
-        raise StudyError(f"{path}: the study is not UTF-8 text: {error.reason}") from error
+        line = 1 + error.object[: error.start].count(b"\n")
+        raise StudyError(f"{path}, line {line}: the study is not UTF-8 text: {error.reason}") from error
     except tomllib.TOMLDecodeError as error:
         raise StudyError(_syntax(str(path), str(error))) from error
     return document, Source(str(path), lines_of(text))

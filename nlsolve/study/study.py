@@ -18,7 +18,7 @@ from nlsolve.results.columns import RUNS, is_measured, no_such_column
 from nlsolve.results.parameters import VARIANT, names_settings
 from nlsolve.results.reference_error import REFERENCE
 from nlsolve.show.expectations import Expectation
-from nlsolve.show.figures import FigureSpec
+from nlsolve.show.figures import BaseFigure, FigureSpec
 from nlsolve.show.tables import TableSpec, check
 from nlsolve.study.case import Case, Composer, Invalid
 from nlsolve.study.documents import EXTENDS, PLUGINS, read_document
@@ -170,6 +170,7 @@ class _Builder:
             for column in columns
             if column not in known and not is_measured(column)
         ]
+        problems += _called_alike("table", frame.table) + _called_alike("figure", frame.figure)
         expectations = frame.expect if not self.quick or "expect" in self.document["quick"] else ()
         names = [spec.name for spec in frame.table]
         problems += [
@@ -341,6 +342,17 @@ def _written(document: Document) -> dict[str, Any]:
 def _settings_of(case: Case) -> str:
     """The names of the settings that a case was made by."""
     return ", ".join(word for name, word in case.parameters.items() if names_settings(name))
+
+
+def _called_alike(noun: str, specs: Sequence[TableSpec | BaseFigure]) -> list[Problem]:
+    """A problem for each table or figure whose files would replace those of an earlier one."""
+    problems, names = [], set[str]()
+    for number, spec in enumerate(specs):
+        if spec.name.casefold() in names:
+            sentence = f"another {noun} has this name, perhaps in other letter case; its files would be replaced"
+            problems.append(Problem((noun, number, "name"), spec.name, sentence))
+        names.add(spec.name.casefold())
+    return problems
 
 
 def _differing(everyone: Sequence[Mapping[str, Any]]) -> set[str]:
