@@ -13,7 +13,17 @@ from rich.console import Console
 
 from nlsolve.cli.endings import ExitCode, ending
 from nlsolve.cli.folders import folders
-from nlsolve.cli.options import Json, Out, Quick, Settings, StudyFile, default_folder
+from nlsolve.cli.options import (
+    Disabled,
+    Json,
+    Out,
+    PluginFiles,
+    Quick,
+    Settings,
+    StudyFile,
+    default_folder,
+    registry_of,
+)
 from nlsolve.cli.printing import (
     count,
     left_out,
@@ -22,11 +32,11 @@ from nlsolve.cli.printing import (
     print_results,
     say,
     say_endings,
+    say_excluded,
 )
 from nlsolve.cli.progress import Watch
 from nlsolve.contracts.status import Status
 from nlsolve.registry.problems import StudyError, did_you_mean
-from nlsolve.registry.registry import load_registry
 from nlsolve.results.frames import json_rows
 from nlsolve.running.diagnose import diagnose as diagnostics_of
 from nlsolve.running.forecast import ASSUMPTION, forecast
@@ -34,6 +44,7 @@ from nlsolve.running.runner import run as run_study
 from nlsolve.running.store.parts import Parts
 from nlsolve.running.store.standing import KEPT, standings_of
 from nlsolve.study.case import section_rows
+from nlsolve.study.keys.schema import study_schema
 from nlsolve.study.study import Study
 from nlsolve.study.sweeps import parse_assignments
 
@@ -64,6 +75,8 @@ def run(
     out: Out = None,
     settings: Settings = None,
     quick: Quick = False,
+    plugin: PluginFiles = None,
+    disable_plugin: Disabled = None,
     as_json: Json = False,
     jobs: Annotated[
         int | None,
@@ -82,7 +95,8 @@ def run(
     folder = out or default_folder(study, quick)
     console = Console(stderr=True)
     with ending(folder):
-        checked = Study.from_toml(study, parse_assignments(settings or []), quick)
+        registry = registry_of(plugin, disable_plugin)
+        checked = Study.from_toml(study, parse_assignments(settings or []), quick, registry)
         with Watch(console) as watch:
             results = run_study(
                 checked,
@@ -94,37 +108,57 @@ def run(
                 debugger=watch.debug if pdb else None,
             )
     print_results(results, as_json)
+    say_excluded(checked)
     for line in (*left_out(results.runs), *results.notes):
         say(line)
+    for finding in results.findings:
+        say(str(finding))
     say_endings(results)
     if results.crashed:
         raise typer.Exit(ExitCode.CRASHED)
+    if not all(finding.holds for finding in results.findings):
+        raise typer.Exit(ExitCode.NOT_FOUND)
 
 
 @app.command()
-def validate(study: StudyFile, settings: Settings = None, as_json: Json = False) -> None:
+def validate(
+    study: StudyFile,
+    settings: Settings = None,
+    plugin: PluginFiles = None,
+    disable_plugin: Disabled = None,
+    as_json: Json = False,
+) -> None:
     """Check a study, and its quick form if it has one, without running it."""
     with ending():
-        overrides = parse_assignments(settings or [])
-        checked = Study.from_toml(study, overrides)
-        quick = Study.from_toml(study, overrides, quick=True) if checked.has_quick else None
+        overrides, registry = parse_assignments(settings or []), registry_of(plugin, disable_plugin)
+        checked = Study.from_toml(study, overrides, registry=registry)
+        quick = Study.from_toml(study, overrides, quick=True, registry=registry) if checked.has_quick else None
     found = {"study": checked.name, "question": checked.question, "cases": len(checked.cases)}
     found |= {"quick_cases": len(quick.cases)} if quick else {}
+    found |= {"excluded": [asdict(excluded) for excluded in checked.excluded]} if checked.excluded else {}
     if as_json:
         typer.echo(json.dumps(found))
     else:
         extra = f" ({len(quick.cases)} with --quick)" if quick else ""
+        say_excluded(checked)
         typer.echo(f"{study} is valid: {count(len(checked.cases))}{extra}. {checked.question}")
 
 
 @app.command()
 def plan(
-    study: StudyFile, out: Out = None, settings: Settings = None, quick: Quick = False, as_json: Json = False
+    study: StudyFile,
+    out: Out = None,
+    settings: Settings = None,
+    quick: Quick = False,
+    plugin: PluginFiles = None,
+    disable_plugin: Disabled = None,
+    as_json: Json = False,
 ) -> None:
     """List the cases of a study, which of them are to be run and why, and forecast what they cost."""
     folder = out or default_folder(study, quick)
     with ending():
-        checked = Study.from_toml(study, parse_assignments(settings or []), quick)
+        registry = registry_of(plugin, disable_plugin)
+        checked = Study.from_toml(study, parse_assignments(settings or []), quick, registry)
         words = standings_of(Parts(folder), checked)
         frame = forecast(checked)
     frame.insert(1, "plan", frame["case"].map(words))
@@ -133,6 +167,7 @@ def plan(
         return
     swept = list(dict.fromkeys(name for case in checked.cases for name in case.swept))
     sizes = ["increments", "nodes", "unknowns", "seconds_factorization", "seconds_start", "seconds", "seconds_all"]
+    say_excluded(checked)
     print_frame(count(len(frame)), frame[["case", "plan", *swept, *sizes]])
     left = frame[frame["plan"] != KEPT]
     told = ", ".join(f"{number} {word}" for word, number in frame["plan"].value_counts().items())
@@ -141,10 +176,18 @@ def plan(
 
 
 @app.command()
-def diagnose(study: StudyFile, settings: Settings = None, quick: Quick = False, as_json: Json = False) -> None:
+def diagnose(
+    study: StudyFile,
+    settings: Settings = None,
+    quick: Quick = False,
+    plugin: PluginFiles = None,
+    disable_plugin: Disabled = None,
+    as_json: Json = False,
+) -> None:
     """Measure the operators on the clouds of a study: supports, balance, reproduction, largest weight."""
     with ending():
-        frame = diagnostics_of(Study.from_toml(study, parse_assignments(settings or []), quick))
+        registry = registry_of(plugin, disable_plugin)
+        frame = diagnostics_of(Study.from_toml(study, parse_assignments(settings or []), quick, registry))
     if as_json:
         typer.echo(json.dumps(json_rows(frame)))
     else:
@@ -152,14 +195,23 @@ def diagnose(study: StudyFile, settings: Settings = None, quick: Quick = False, 
 
 
 @app.command()
-def plugins(as_json: Json = False) -> None:
+def plugins(plugin: PluginFiles = None, disable_plugin: Disabled = None, as_json: Json = False) -> None:
     """List the sections of a study and what is installed for them, with parameters, and what failed to load."""
-    registry = load_registry()
+    with ending():
+        registry = registry_of(plugin, disable_plugin)
     rows = [*section_rows(registry), *registry.plugins()]
     if as_json:
         typer.echo(json.dumps(to_jsonable_python([asdict(row) for row in rows])))
         return
     print_plugins(rows)
+
+
+@app.command()
+def schema(plugin: PluginFiles = None, disable_plugin: Disabled = None) -> None:
+    """Print the JSON schema of study files, composed from the installed plugins."""
+    with ending():
+        registry = registry_of(plugin, disable_plugin)
+    typer.echo(json.dumps(study_schema(registry), indent=1, ensure_ascii=False))
 
 
 def statuses(words: list[str]) -> list[Status]:

@@ -19,6 +19,7 @@ class ExitCode(IntEnum):
     COMPLETE = 0
     CRASHED = 1
     INVALID = 2
+    NOT_FOUND = 3
     INTERRUPTED = 130
 
 

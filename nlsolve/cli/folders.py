@@ -10,8 +10,18 @@ from typing import Annotated
 import typer
 
 from nlsolve.cli.endings import ending
-from nlsolve.cli.options import Json, Out, Quick, Settings, StudyFile, default_folder
-from nlsolve.cli.printing import count, say, stdout
+from nlsolve.cli.options import (
+    Disabled,
+    Json,
+    Out,
+    PluginFiles,
+    Quick,
+    Settings,
+    StudyFile,
+    default_folder,
+    registry_of,
+)
+from nlsolve.cli.printing import count, print_table, say
 from nlsolve.registry.problems import StudyError, did_you_mean
 from nlsolve.running.store.reading import FolderStatus, read_tables, status_of_folder
 from nlsolve.running.store.upkeep import export as packed
@@ -44,8 +54,7 @@ def table(
         typer.echo(json.dumps({table.spec.name: table.long() for table in tables}))
         return
     for declared in tables:
-        for printed in declared.rich():
-            stdout().print(printed)
+        print_table(declared)
 
 
 @folders.command()
@@ -120,13 +129,16 @@ def export(
     out: Out = None,
     settings: Settings = None,
     quick: Quick = False,
+    plugin: PluginFiles = None,
+    disable_plugin: Disabled = None,
     to: Annotated[Path | None, typer.Option(metavar="FILE", help="the zip; default: NAME.zip")] = None,
 ) -> None:
     """Pack a study, the files of nodes it reads, the versions of plugins, and its results into one zip to rerun."""
     folder, target = out or default_folder(study, quick), to or Path(f"{study.stem}.zip")
     options = [word for setting in settings or [] for word in ("--set", setting)] + ["--quick"] * quick
     with ending():
-        checked = Study.from_toml(study, parse_assignments(settings or []), quick)
+        registry = registry_of(plugin, disable_plugin)
+        checked = Study.from_toml(study, parse_assignments(settings or []), quick, registry)
         missing = packed(checked, study.read_text(encoding="utf-8"), shlex.join(options), folder, target)
     for path in missing:
         say(f"{path} is not in the zip: the study must name it by a path within the folder it is run in")

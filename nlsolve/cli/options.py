@@ -7,15 +7,33 @@ from typing import Annotated
 
 import typer
 
+from nlsolve.cli.disabling import disable
+from nlsolve.registry.plugin_files import with_files
+from nlsolve.registry.registry import Registry, load_registry
+
 StudyFile = Annotated[Path, typer.Argument(metavar="STUDY", help="a study file (TOML)")]
 Settings = Annotated[
     list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="set a parameter, such as solver.order=20")
 ]
 Quick = Annotated[bool, typer.Option("--quick", help="the shrunk study of the file's [quick] section")]
 Out = Annotated[Path | None, typer.Option(help="results folder; default: results/NAME or results/NAME-quick")]
+PluginFiles = Annotated[
+    list[Path] | None,
+    typer.Option("--plugin", metavar="FILE", help="a plugin of one file, beside those that the study names"),
+]
+Disabled = Annotated[
+    list[str] | None,
+    typer.Option("--disable-plugin", metavar="NAME", help="a plugin, or a package of plugins, that is not imported"),
+]
 Json = Annotated[bool, typer.Option("--json", help="machine-readable output")]
 
 
 def default_folder(study: Path, quick: bool) -> Path:
     """The results folder of a study where none is named."""
     return Path("results") / (study.stem + ("-quick" if quick else ""))
+
+
+def registry_of(files: list[Path] | None, disabled: list[str] | None) -> Registry:
+    """The installed plugins but those disabled, and those of files. Raises StudyError for one that cannot be used."""
+    disable(disabled or [])
+    return with_files(load_registry(), files or [])

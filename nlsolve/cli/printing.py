@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+from collections import Counter
 from collections.abc import Mapping
+from dataclasses import asdict
 from typing import Any
 
 import pandas as pd
@@ -20,6 +22,11 @@ from nlsolve.results.verdicts import status_of
 from nlsolve.running.retry import is_final
 from nlsolve.running.runner import Results
 from nlsolve.running.store.reading import output_file
+from nlsolve.show.tables import Table
+from nlsolve.study.study import Study
+
+MOST_RULED = 500
+"""Rows up to which a table is printed with rules; ruling ten thousand takes half a minute."""
 
 UNFOLDED = 400
 """Characters a line may have in a file or a pipe."""
@@ -35,6 +42,13 @@ def count(cases: int) -> str:
     return f"{cases} case{'' if cases == 1 else 's'}"
 
 
+def say_excluded(study: Study) -> None:
+    """Say how many cases a study leaves out, and why."""
+    reasons = Counter(excluded.reason for excluded in study.excluded)
+    for reason, number in reasons.items():
+        say(f"left out: {count(number)}: {reason}")
+
+
 def stdout() -> Console:
     """Standard output; tables are not folded when it is a file or a pipe."""
     console = Console()
@@ -42,13 +56,33 @@ def stdout() -> Console:
 
 
 def print_frame(title: str, frame: pd.DataFrame) -> None:
-    """Print a frame as a table on standard output."""
+    """Print a frame on standard output: as a table, or, of many rows, as lines with aligned columns."""
+    headings = [str(heading) for heading in frame.columns]
+    rows = [
+        [f"{value:.4g}" if isinstance(value, float) else str(value) for value in row]
+        for row in frame.itertuples(index=False)
+    ]
+    if len(rows) > MOST_RULED:
+        widths = [max(map(len, column)) for column in zip(headings, *rows, strict=True)]
+        lines = ("  ".join(map(str.ljust, row, widths)).rstrip() for row in [headings, *rows])
+        typer.echo("\n".join([title, *lines]))
+        return
     printed = RichTable(title=escape(title))
-    for heading in frame.columns:
-        printed.add_column(escape(str(heading)), overflow="fold")
-    for row in frame.itertuples(index=False):
-        printed.add_row(*(escape(f"{value:.4g}" if isinstance(value, float) else str(value)) for value in row))
+    for heading in headings:
+        printed.add_column(escape(heading), overflow="fold")
+    for row in rows:
+        printed.add_row(*map(escape, row))
     stdout().print(printed)
+
+
+def print_table(table: Table) -> None:
+    """Print a declared table, and what it is compared with, on standard output."""
+    if len(table.cells) > MOST_RULED:
+        for title, frame in table.flat().items():
+            print_frame(title, frame)
+        return
+    for printed in table.rich():
+        stdout().print(printed)
 
 
 def print_results(results: Results, as_json: bool) -> None:
@@ -57,11 +91,11 @@ def print_results(results: Results, as_json: bool) -> None:
     if as_json:
         shown = {table.spec.name: table.long() for table in tables}
         document = {"study": results.study.name, "folder": str(results.folder), "runs": json_rows(results.runs)}
-        typer.echo(json.dumps(document | {"tables": shown, "notes": list(results.notes)}))
+        findings = [asdict(finding) for finding in results.findings]
+        typer.echo(json.dumps(document | {"tables": shown, "notes": list(results.notes), "findings": findings}))
         return
     for declared in tables:
-        for printed in declared.rich():
-            stdout().print(printed)
+        print_table(declared)
     if not tables:
         swept = list(dict.fromkeys(name for case in results.study.cases for name in case.swept))
         print_frame(results.study.question, results.runs[["case", *swept, "status", "message"]])

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from typing import Annotated, Any
 
-from pydantic import BeforeValidator, SerializeAsAny
+from pydantic import BeforeValidator, SerializeAsAny, WithJsonSchema
 
 from nlsolve.contracts.component import Component
 from nlsolve.contracts.continuum.discretizer import Discretizer
@@ -17,7 +17,10 @@ from nlsolve.contracts.nonlinear_solver import NonlinearSolver
 from nlsolve.contracts.rules.globalization import Globalization
 from nlsolve.contracts.rules.homotopy_form import HomotopyForm
 from nlsolve.contracts.rules.range_rule import RangeRule
-from nlsolve.registry.registry import load_registry
+from nlsolve.registry.registry import registry_in_use
+
+CONTRACT, BY_NAME = "x-contract", "x-by-name"
+"""Keys of a schema that stands for all kinds of a contract, and whether a kind alone may be written."""
 
 
 def installed(contract: type[Component], by_name: bool = False) -> BeforeValidator:
@@ -28,21 +31,35 @@ def installed(contract: type[Component], by_name: bool = False) -> BeforeValidat
 
     def component(value: Any) -> Component:
         table = {"kind": value} if by_name and isinstance(value, str) else value
-        return load_registry().component(contract.noun, table)
+        return registry_in_use().component(contract.noun, table)
 
     return BeforeValidator(component)
 
 
-Globalized = Annotated[SerializeAsAny[Globalization], installed(Globalization)]
+def described(contract: type[Component], by_name: bool = False) -> WithJsonSchema:
+    """What the schema of a study says of a field with any component of this contract."""
+    return WithJsonSchema({CONTRACT: contract.noun, BY_NAME: by_name})
+
+
+Globalized = Annotated[SerializeAsAny[Globalization], installed(Globalization), described(Globalization)]
 """The type of a field that holds a globalisation."""
 
-AnySolver = Annotated[SerializeAsAny[NonlinearSolver], installed(NonlinearSolver)]
+AnySolver = Annotated[SerializeAsAny[NonlinearSolver], installed(NonlinearSolver), described(NonlinearSolver)]
 """The type of a field that holds a nonlinear solver."""
 
-AnyRange = Annotated[SerializeAsAny[RangeRule], installed(RangeRule, by_name=True)]
+AnyRange = Annotated[
+    SerializeAsAny[RangeRule],
+    installed(RangeRule, by_name=True),
+    described(RangeRule, by_name=True),
+]
 """The type of a field that holds a range rule, by its table or its name."""
 
-AnyForm = Annotated[SerializeAsAny[HomotopyForm], installed(HomotopyForm, by_name=True)]
+AnyForm = Annotated[
+    SerializeAsAny[HomotopyForm],
+    installed(HomotopyForm, by_name=True),
+    described(HomotopyForm, by_name=True),
+]
 """The type of a field that holds a homotopy form, by its table or its name."""
-AnyDiscretizer = Annotated[SerializeAsAny[Discretizer], installed(Discretizer)]
+
+AnyDiscretizer = Annotated[SerializeAsAny[Discretizer], installed(Discretizer), described(Discretizer)]
 """The type of a field that holds a discretizer."""

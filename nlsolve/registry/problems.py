@@ -12,14 +12,21 @@ from pydantic import BaseModel, ValidationError
 from nlsolve.contracts.component import Component
 from nlsolve.contracts.status import InputError
 from nlsolve.registry.component_tables import ComponentTable
-from nlsolve.registry.registry import CONTRACTS, load_registry
-from nlsolve.registry.toml_lines import Place, nearest_line
+from nlsolve.registry.registry import CONTRACTS, registry_in_use
+from nlsolve.registry.toml_lines import Place, nearest_place
 
 LONGEST_VALUE = 60
 """Longest offending value that a sentence repeats, in characters."""
 
 ABSENT = object()
 """Stands for a value that is missing, or that the sentence need not repeat."""
+
+MISSING = "required, and missing"
+
+SHAPES = dict.fromkeys(("tuple_type", "list_type"), "should be a list") | dict.fromkeys(
+    ("dict_type", "model_type"), "should be a table"
+)
+"""What is said of a value that is no list or no table, by pydantic's name of the mistake."""
 
 MOVED: dict[str, str] = {
     "counterpart": "error_estimator",
@@ -70,18 +77,20 @@ class Source:
     """Where the parts of a document were written.
 
     file : name of the study file, or of the caller that gave the document.
-    lines : line of each place in the file.
+    lines : line of each place in its file.
+    files : the file of each place that is written in another one, which this study extends.
     aliases : dotted names that were last set elsewhere (in a sweep, [quick] or --set), and where they were set.
     """
 
     file: str
-    lines: dict[Place, int] = field(default_factory=dict)
+    lines: Mapping[Place, int] = field(default_factory=dict)
+    files: Mapping[Place, str] = field(default_factory=dict)
     aliases: Mapping[str, str] = field(default_factory=dict)
 
     def at(self, place: Place) -> str:
         """File and line of a place in the document."""
-        line = nearest_line(self.lines, place)
-        return self.file if line is None else f"{self.file}, line {line}"
+        written = nearest_place(self.lines, place)
+        return self.file if written is None else f"{self.files.get(written, self.file)}, line {self.lines[written]}"
 
     def of(self, place: Place) -> str:
         """Where the value at a place was set last: in a sweep, [quick] or --set, or on a line of the file."""
@@ -127,36 +136,44 @@ def unknown(place: Place, value: Any, reason: str, names: Iterable[str]) -> Prob
 def problems_in(error: ValidationError, model: type[BaseModel], document: Any) -> list[Problem]:
     """The mistakes that pydantic found, by the places of the document itself; one for each place."""
     found: dict[Place, Problem] = {}
+    meant: set[Place] = set()  # what a misspelt name stands for is not missing as well
     for detail in error.errors(include_url=False):
         problem = _problem(detail, model, document)
+        if detail["type"] == "extra_forbidden":
+            names = _fields_at(model, problem.place[:-1], document)
+            meant |= {(*problem.place[:-1], name) for name in get_close_matches(str(problem.place[-1]), names, n=1)}
         earlier = found.get(problem.place)
         if earlier is None:
             found[problem.place] = problem
         elif problem.expected not in earlier.expected:  # each member of a union reports a mistake of its own
             both = f"{earlier.expected} or {problem.expected}"
             found[problem.place] = Problem(problem.place, problem.value, both)
-    return list(found.values())
+    return [problem for place, problem in found.items() if place not in meant or problem.expected != MISSING]
 
 
 def _problem(detail: Mapping[str, Any], model: type[BaseModel], document: Any) -> Problem:
     kind, value, context = detail["type"], detail["input"], detail.get("ctx", {})
-    place = _place_in(document, detail["loc"], missing=kind == "missing")
+    place = _place_in(document, detail["loc"], missing=kind in ("missing", "kind_missing", "kind_unknown"))
     if kind == "extra_forbidden":
         names = [name for name in _fields_at(model, place[:-1], document) if name != place[-1]]
         return unknown(place, value, "no such field", names)
     if kind == "missing":
-        return Problem(place, ABSENT, "required, and missing")
+        return Problem(place, ABSENT, MISSING)
     if kind == "kind_missing":
         return Problem((*place, "kind"), ABSENT, detail["msg"])
     if kind == "kind_unknown" and isinstance(value, Mapping):
         return Problem((*place, "kind"), value["kind"], detail["msg"])
     if kind == "union_tag_not_found":
-        return Problem((*place, "kind"), ABSENT, "required, and missing")
+        return Problem((*place, "kind"), ABSENT, MISSING)
+    if kind in SHAPES:
+        return Problem(place, value, SHAPES[kind])
     if kind == "union_tag_invalid":
         return Problem((*place, "kind"), context["tag"], _choice(context["tag"], context["expected_tags"]))
     if kind == "literal_error":
         return Problem(place, value, _choice(value, context["expected"]))
-    message = detail["msg"].removeprefix("Value error, ").removeprefix("Input ")
+    message = detail["msg"]
+    for beginning in ("Value error, ", "Input ", "String ", "Dictionary "):
+        message = message.removeprefix(beginning)
     return Problem(place, value, message)
 
 
@@ -199,6 +216,9 @@ def _chosen(candidates: list[type[BaseModel]], document: Any) -> type[BaseModel]
     """The model whose `kind` the document names, or the class that a table was made from."""
     if isinstance(document, ComponentTable):
         return document.cls
+    noun = getattr(candidates[0], "noun", None)
+    if noun in CONTRACTS and (named := registry_in_use().class_of(noun, document)) is not None:
+        return named
     for candidate in candidates:
         info = candidate.model_fields.get("kind")
         if (
@@ -213,7 +233,7 @@ def _chosen(candidates: list[type[BaseModel]], document: Any) -> type[BaseModel]
 def _models_in(annotation: Any) -> list[type[BaseModel]]:
     """The models in a type such as Annotated[A | B, …] or list[A]; for a contract, its installed classes."""
     if isinstance(annotation, type) and issubclass(annotation, Component) and annotation in CONTRACTS.values():
-        return list(load_registry().classes(annotation.noun).values())
+        return list(registry_in_use().classes(annotation.noun).values())
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         return [annotation]
     inner = getattr(annotation, "__value__", None)

@@ -1,17 +1,23 @@
 """The component classes that installed plugins offer, by noun and kind.
 
 A plugin that cannot be imported or registered becomes a row with the reason, and the other plugins work. A kind that
-two plugins offer cannot be used until one of the two packages is removed.
+several packages offer is the first-party one; without that, a study asks for one of them by a qualified kind:
+`my-package:newton`.
 """
 
 from __future__ import annotations
 
 import inspect
-from collections.abc import Mapping
+import os
+from collections.abc import Collection, Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from contextvars import ContextVar
+from copy import copy
 from dataclasses import dataclass
 from difflib import get_close_matches
 from functools import cache
 from importlib.metadata import EntryPoint, entry_points
+from pathlib import Path
 from typing import Annotated, Any, Union, get_args
 
 import pluggy
@@ -54,6 +60,17 @@ CONTRACTS: dict[str, type[Component]] = {
 """The contracts whose classes a plugin may offer, by noun, in the order of a study file."""
 
 
+FIRST_PARTY = "nlsolve"
+"""The package whose kinds are meant where a study asks for one that other packages offer too."""
+
+QUALIFIED = ":"
+"""Stands between a package and a kind of it: `my-package:newton`."""
+
+DISABLE = "NLSOLVE_DISABLE_PLUGINS"
+"""Environment variable with the names of plugins, or packages of plugins, not to be imported: `first,second`."""
+
+DISABLED = "disabled"
+
 RENAMED_KINDS = {("scene", "system"): "published"}
 """Kinds of older study files, by noun, and what they are called now."""
 
@@ -85,8 +102,16 @@ class PluginRow:
 
 @dataclass(frozen=True)
 class _Offer:
+    """provider : the package, or the stem of the file, that offers the class."""
+
     cls: type[Component]
     source: str
+    provider: str
+
+    @property
+    def name(self) -> str:
+        """The qualified kind."""
+        return f"{self.provider}{QUALIFIED}{self.cls.kind_name()}"
 
 
 class Registry:
@@ -97,40 +122,70 @@ class Registry:
         self._manager.add_hookspecs(hookspecs)
         self._offers: dict[tuple[str, str], list[_Offer]] = {}
         self._failures: list[PluginRow] = []
+        self._usable: dict[str, dict[str, type[Component]]] = {}
+        self._disabled: list[PluginRow] = []
+        self.files: tuple[Path, ...] = ()
 
     @classmethod
-    def installed(cls) -> Registry:
-        """A registry of all plugins in the entry-point group, loaded in the order of their names."""
+    def installed(cls, disabled: Collection[str] = ()) -> Registry:
+        """A registry of the plugins in the entry-point group, loaded in the order of their names.
+
+        disabled : names of plugins, or of packages of plugins, that are not imported.
+        """
         registry = cls()
-        entries = sorted(entry_points(group=hookspecs.PROJECT), key=lambda entry: (entry.name, entry.value))
-        faults = faults_of([entry for entry in entries if not _is_own(entry)])
+        entries = installed_plugins()
+        wanted = [entry for entry in entries if names_of(entry).isdisjoint(disabled)]
+        faults = faults_of([entry for entry in wanted if not _is_own(entry)])
         for entry in entries:
-            if entry.value in faults:
-                registry._fail(_source(entry), f"the plugin {entry.name!r} cannot be imported: {faults[entry.value]}")
+            if entry not in wanted:
+                registry._disabled.append(PluginRow("", "", source_of(entry), failure=DISABLED))
+            elif entry.value in faults:
+                registry._fail(source_of(entry), f"the plugin {entry.name!r} cannot be imported: {faults[entry.value]}")
             else:
                 registry.load(entry)
         return registry
 
     def load(self, entry: EntryPoint) -> None:
         """Import the plugin of one entry point and register it; a failure becomes a row."""
-        source = _source(entry)
+        source = source_of(entry)
         try:
             with undisturbed():
                 plugin = entry.load()
         except (Exception, SystemExit) as error:  # a stranger's import may raise anything; the rest must still work
-            self._fail(source, f"the plugin {entry.name!r} cannot be imported: {_sentence(error)}")
+            self._fail(source, f"the plugin {entry.name!r} cannot be imported: {sentence_of(error)}")
         else:
             self.add(plugin, source)
 
     def add(self, plugin: object, source: str) -> None:
-        """Register a module or object with a `nlsolve_components` hook; a failure becomes a row."""
+        """Register a module or object with a `nlsolve_components` hook; a failure becomes a row.
+
+        source : the package that it comes from, and whatever else tells it: "my-package 1.0 (module)".
+        """
         try:
             offered = self._offered_by(plugin)
         except Exception as error:  # as above: a stranger's hook
-            self._fail(source, f"the plugin cannot be registered: {_sentence(error)}")
+            self._fail(source, f"the plugin cannot be registered: {sentence_of(error)}")
             return
-        for cls in offered:
-            self._offers.setdefault((cls.noun, cls.kind_name()), []).append(_Offer(cls, source))
+        self.offer(offered, source)
+
+    def offer(self, classes: Iterable[type[Component]], source: str) -> None:
+        """Take up component classes. Raises TypeError for a class that no study can ask for."""
+        for cls in map(_checked, classes):
+            offer = _Offer(cls, source, source.partition(" ")[0])
+            self._offers.setdefault((cls.noun, cls.kind_name()), []).append(offer)
+        self._usable.clear()
+
+    def with_(self, classes: Iterable[type[Component]], source: str, file: Path) -> Registry:
+        """A registry that has the classes of a file as well; `files` are all such files.
+
+        Raises TypeError for a class that no study can ask for.
+        """
+        wider = copy(self)
+        wider._offers = {name: list(offers) for name, offers in self._offers.items()}
+        wider._usable = {}
+        wider.files = (*self.files, file)
+        wider.offer(classes, source)
+        return wider
 
     def _offered_by(self, plugin: object) -> list[type[Component]]:
         """The checked classes of one plugin. Its hook is called alone, so that a failure concerns no other plugin.
@@ -159,30 +214,83 @@ class Registry:
     def _fail(self, source: str, reason: str) -> None:
         self._failures.append(PluginRow("", "", source, failure=reason))
 
-    def classes(self, noun: str) -> dict[str, type[Component]]:
+    def classes(self, noun: str) -> Mapping[str, type[Component]]:
         """The usable classes of one noun, by kind."""
-        return {
-            kind: offers[0].cls
-            for (offered_noun, kind), offers in sorted(self._offers.items(), key=lambda item: item[0])
-            if offered_noun == noun and len(offers) == 1 and offers[0].cls.absent is None
-        }
+        if noun not in self._usable:
+            kinds = sorted(kind for offered_noun, kind in self._offers if offered_noun == noun)
+            chosen = {kind: self._chosen(noun, kind) for kind in kinds}
+            self._usable[noun] = {
+                kind: offers[0].cls
+                for kind, offers in chosen.items()
+                if len(offers) == 1 and offers[0].cls.absent is None
+            }
+        return self._usable[noun]
+
+    def offered(self, noun: str, absent_too: bool = False) -> dict[str, type[Component]]:
+        """The classes of one noun by the kind that asks for each, qualified where the kind alone means another class.
+
+        absent_too : whether classes whose libraries are not installed are among them.
+        """
+        found = {}
+        for row_noun, kind in sorted(self._offers):
+            for offer in self._offers[row_noun, kind] if row_noun == noun else ():
+                name = kind if self._chosen(noun, kind) == [offer] else offer.name
+                if self._chosen(noun, name) == [offer] and (absent_too or offer.cls.absent is None):
+                    found[name] = offer.cls
+        return found
+
+    def qualified(self, noun: str, kind: str) -> list[str]:
+        """The qualified kind of the class that an unqualified kind means; of a qualified one there is no other."""
+        return [offer.name for offer in self._chosen(noun, kind)] if QUALIFIED not in kind else []
+
+    def class_called(self, noun: str, kind: str) -> type[Component] | None:
+        """The usable class of a kind, qualified or not; None when there is none."""
+        if QUALIFIED not in kind:
+            return self.classes(noun).get(kind)
+        offers = self._chosen(noun, kind)
+        return offers[0].cls if len(offers) == 1 and offers[0].cls.absent is None else None
+
+    def kind_of(self, component: Component) -> str | None:
+        """The kind by which a study asks for a component's own class, qualified where the kind alone means another
+        class; None when no plugin offers the class."""
+        cls, kind = type(component), component.kind_name()
+        if self.classes(component.noun).get(kind) is cls:
+            return kind
+        return next((offer.name for offer in self._offers.get((component.noun, kind), []) if offer.cls is cls), None)
+
+    def _chosen(self, noun: str, kind: str) -> list[_Offer]:
+        """The offers that a kind stands for: those of the package that it names, or else the first-party ones among
+        several."""
+        provider, colon, bare = kind.rpartition(QUALIFIED)
+        offers = self._offers.get((noun, bare), [])
+        if colon:
+            return [offer for offer in offers if offer.provider == provider]
+        own = [offer for offer in offers if offer.provider == FIRST_PARTY]
+        return own if own and len(offers) > 1 else offers
 
     def complaint(self, noun: str, kind: object) -> str | None:
         """Why this noun and kind have no usable class, in one sentence; None when they have one."""
         classes = self.classes(noun)
-        if isinstance(kind, str) and kind in classes:
+        if isinstance(kind, str) and self.class_called(noun, kind) is not None:
             return None
-        offers = self._offers.get((noun, kind), []) if isinstance(kind, str) else []
+        offers = self._chosen(noun, kind) if isinstance(kind, str) else []
         if len(offers) == 1:
             return f"{noun} {kind!r} {offers[0].cls.absent}"
         if offers:
-            both = " and ".join(offer.source for offer in offers)
-            return f"{noun} {kind!r} is offered by {both}: uninstall all but one"
+            both, names = " and ".join(offer.source for offer in offers), sorted({offer.name for offer in offers})
+            way = f"ask for {' or '.join(map(repr, names))}" if len(names) > 1 else "uninstall all but one"
+            return f"{noun} {kind!r} is offered by {both}: {way}"
         if isinstance(kind, str) and (noun, kind) in RENAMED_KINDS:
             return f"this kind is called {RENAMED_KINDS[noun, kind]!r} now"
+        failed = f"; {len(self._failures)} plugin(s) failed, see `nlsolve plugins`" if self._failures else ""
+        failed += f"; {len(self._disabled)} plugin(s) disabled" if self._disabled else ""
+        if isinstance(kind, str) and QUALIFIED in kind:
+            provider, _, bare = kind.rpartition(QUALIFIED)
+            others = [offer.name for offer in self._offers.get((noun, bare), [])]
+            there = f"it is offered as {', '.join(others)}" if others else f"nothing offers a {noun} of this kind"
+            return f"{provider!r} offers no {noun} {bare!r}; {there}{failed}"
         nearest = get_close_matches(str(kind), classes, n=1)
         guess = f"did you mean {nearest[0]!r}? " if nearest else ""
-        failed = f"; {len(self._failures)} plugin(s) failed, see `nlsolve plugins`" if self._failures else ""
         return f"no such {noun}; {guess}installed: {', '.join(classes) or 'none'}{failed}"
 
     def known(self, noun: str, value: object) -> object:
@@ -227,7 +335,7 @@ class Registry:
         if (own := own_class(value)) is not None:
             return own
         kind = value.get("kind") if isinstance(value, Mapping) else None
-        return self.classes(noun).get(kind) if isinstance(kind, str) else None
+        return self.class_called(noun, kind) if isinstance(kind, str) else None
 
     def component(self, noun: str, value: object) -> Component:
         """`value` itself when it is a component, of any class, installed or not; the component of a table otherwise.
@@ -239,11 +347,10 @@ class Registry:
             return known
         cls = self.class_of(noun, known)
         assert cls is not None  # because `known` has found it
+        assert isinstance(known, Mapping)  # as above
+        if QUALIFIED in str(known.get("kind")):
+            known = {**known, "kind": cls.kind_name()}
         return cls.model_validate(known)
-
-    def is_installed(self, component: Component) -> bool:
-        """Whether the registry has the component's own class under its noun and kind."""
-        return self.classes(component.noun).get(component.kind_name()) is type(component)
 
     def union(self, noun: str) -> Any:
         """The pydantic type of a section: an instance of any class of this noun, or a table of an installed one."""
@@ -261,20 +368,54 @@ class Registry:
         for (noun, kind), offers in sorted(
             self._offers.items(), key=lambda item: (order.index(item[0][0]), item[0][1])
         ):
-            failure = self.complaint(noun, kind)
-            rows += [PluginRow(noun, kind, offer.source, parameters_of(offer.cls), failure) for offer in offers]
-        return rows + self._failures
+            for offer in offers:
+                name = kind if self._chosen(noun, kind) == [offer] else offer.name
+                failure = self.complaint(noun, name)
+                rows.append(PluginRow(noun, name, offer.source, parameters_of(offer.cls), failure))
+        return rows + self._failures + self._disabled
+
+    @contextmanager
+    def in_use(self) -> Iterator[None]:
+        """Let components inside components be looked up in this registry."""
+        before = _IN_USE.set(self)
+        try:
+            yield
+        finally:
+            _IN_USE.reset(before)
+
+
+def load_registry() -> Registry:
+    """The registry of the installed plugins, without those that the environment variable `DISABLE` names; loaded at
+    the first call in a process."""
+    return _installed(frozenset(filter(None, os.environ.get(DISABLE, "").split(","))))
 
 
 @cache
-def load_registry() -> Registry:
-    """The registry of the installed plugins, loaded at the first call in a process."""
-    return Registry.installed()
+def _installed(disabled: frozenset[str]) -> Registry:
+    return Registry.installed(disabled)
 
 
-def _source(entry: EntryPoint) -> str:
-    """Distribution, version and module of an entry point."""
+def installed_plugins() -> list[EntryPoint]:
+    """The entry points of all installed plugins, in the order of their names."""
+    return sorted(entry_points(group=hookspecs.PROJECT), key=lambda entry: (entry.name, entry.value))
+
+
+def names_of(entry: EntryPoint) -> set[str]:
+    """The names by which a plugin is disabled: its own, and that of its package."""
+    return {entry.name} | ({entry.dist.name} if entry.dist else set())
+
+
+def source_of(entry: EntryPoint) -> str:
+    """Package, version and module of a plugin."""
     return f"{entry.dist.name} {entry.dist.version} ({entry.value})" if entry.dist else entry.value
+
+
+_IN_USE: ContextVar[Registry | None] = ContextVar("registry in use", default=None)
+
+
+def registry_in_use() -> Registry:
+    """The registry of the study that is being built; elsewhere that of the installed plugins."""
+    return _IN_USE.get() or load_registry()
 
 
 def _is_own(entry: EntryPoint) -> bool:
@@ -294,6 +435,8 @@ def _checked(cls: Any) -> type[Component]:
     names = get_args(cls.model_fields["kind"].annotation)
     if names != (kind,):
         raise TypeError(f'{cls.__name__} must declare its name: kind: Literal["name"] = "name"')
+    if QUALIFIED in kind:
+        raise TypeError(f"{cls.__name__} has the kind {kind!r}: a kind has no {QUALIFIED!r}, which packages end with")
     return cls
 
 
@@ -309,6 +452,6 @@ def _parameter(name: str, info: FieldInfo) -> Parameter:
     return Parameter(name, words, "required" if info.is_required() else default, info.description or "")
 
 
-def _sentence(error: BaseException) -> str:
+def sentence_of(error: BaseException) -> str:
     """Exception type and the first line of its text."""
     return f"{type(error).__name__}: {str(error).strip()}".splitlines()[0]

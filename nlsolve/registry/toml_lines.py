@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import tomllib
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
 Place = tuple[str | int, ...]
 """Keys and list positions from the top of a document: ("sweep", 0, "grid", "solver.order")."""
@@ -24,12 +24,9 @@ def lines_of(text: str) -> dict[Place, int]:
     return _Scanner(text).lines
 
 
-def nearest_line(lines: dict[Place, int], place: Place) -> int | None:
-    """The line of a place, or of the closest enclosing place that is written in the file; None when there is none."""
-    for length in range(len(place), 0, -1):
-        if place[:length] in lines:
-            return lines[place[:length]]
-    return None
+def nearest_place(lines: Mapping[Place, int], place: Place) -> Place | None:
+    """A place itself, or the closest enclosing place that is written in the file; None when there is none."""
+    return next((place[:length] for length in range(len(place), 0, -1) if place[:length] in lines), None)
 
 
 class _Scanner:

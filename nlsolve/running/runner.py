@@ -21,6 +21,7 @@ from nlsolve.running.store.parts import Parts, StoreError, merge
 from nlsolve.running.store.reading import completed, description_of, environments_of, finished, of_one_source
 from nlsolve.running.store.store import Store
 from nlsolve.running.turns import Turns
+from nlsolve.show.expectations import Finding, judged
 from nlsolve.show.figures import FigureError, draw, save
 from nlsolve.show.report import write_report
 from nlsolve.show.tables import Table, build
@@ -51,6 +52,11 @@ class Results:
     def crashed(self) -> int:
         """How many cases stopped on an error in the program or in a plugin, or were stopped at a limit."""
         return int(self.runs["status"].isin([status.word for status in (Status.CRASHED, *STOPPED)]).sum())
+
+    @property
+    def findings(self) -> tuple[Finding, ...]:
+        """What the study expects to find, and whether these runs bear it out."""
+        return judged(self.study.expectations, self.study.tables, self.runs)
 
     def tables(self) -> list[Table]:
         """The declared tables that these runs can fill; the others are in `notes`."""

@@ -23,7 +23,9 @@ class StoppingTest(Component):
 
     noun: ClassVar[str] = "stop"
 
-    kind: Literal["residual", "difference", "claim"] = "residual"
+    kind: Literal["residual", "difference", "claim"] = Field(
+        "residual", description="what ends a solve: a small residual, a small step, or the claim of the method itself"
+    )
     tolerance: float = Field(1e-8, gt=0, description="largest relative residual or relative difference accepted")
     norm: Literal["euclidean", "maximum", "components"] = Field(
         "euclidean", description="of a difference: over all nodes, its largest entry, or the larger of u's and v's norm"

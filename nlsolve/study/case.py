@@ -22,8 +22,9 @@ from nlsolve.registry.problems import ABSENT, Problem, problems_in, unknown
 from nlsolve.registry.registry import CONTRACTS, PluginRow, Registry, parameters_of
 from nlsolve.results.parameters import names_settings
 from nlsolve.solving.stopping import Budget, StoppingTest
+from nlsolve.study.known_parts import KnownPart, KnownParts, keys_of
 from nlsolve.study.limits import Limits
-from nlsolve.study.sweeps import Document, Point, leaves
+from nlsolve.study.sweeps import Document, Point
 
 COMMON: Mapping[str, Section] = {
     "linear": Section(LinearSolver),
@@ -37,6 +38,9 @@ COMMON: Mapping[str, Section] = {
 """The sections of every case, besides `scene` and those that the scene's class declares."""
 
 DIGEST_LETTERS = 12
+
+LARGEST = 2**63 - 1
+"""Largest integer that the columns of results can hold."""
 
 
 @dataclass(frozen=True)
@@ -74,13 +78,16 @@ class Invalid(Exception):
 
 
 class Composer:
-    """Makes cases from documents, of the installed components and of those that a document holds as instances."""
+    """Makes cases of the installed components and of those that `documents` hold as instances."""
 
-    def __init__(self, registry: Registry, document: Document) -> None:
+    def __init__(self, registry: Registry, *documents: Mapping[str, Any]) -> None:
         self.registry = registry
+        self._known = KnownParts()
         self._models: dict[type[Component], type[BaseModel]] = {}
         self.all_sections: dict[str, Section] = {}
-        for scene in (*registry.classes(Scene.noun).values(), *classes_in(document)):
+        given = list(classes_in(documents))
+        self._holds_instances = bool(given)
+        for scene in (*registry.classes(Scene.noun).values(), *given):
             if issubclass(scene, Scene):
                 self.all_sections |= sections_of(scene)
         self.all_sections |= COMMON
@@ -92,7 +99,8 @@ class Composer:
 
     def case(self, document: Document, points: Sequence[Point]) -> Case:
         """The case of a document to which the values of `points`, one of each sweep, are assigned. Raises Invalid."""
-        parts: Any = self.parts(document)
+        known, model = self.parts(document)
+        parts: Any = model.model_construct(**{name: part.component for name, part in known.items()})
         if unclaimed := claims_missing(parts.solver, parts.stop):
             raise Invalid(unclaimed)
         try:
@@ -100,16 +108,17 @@ class Composer:
         except Misfit as misfit:
             value = getattr(getattr(parts, misfit.section), misfit.field)
             raise Invalid([Problem((misfit.section, misfit.field), _plain(value), misfit.expected)]) from misfit
-        plain = self.plain(parts)
         swept = {name.split(".")[0] for point in points for name in point.values}
-        telling = {name: section for name, section in plain.items() if name != Limits.noun or name in swept}
-        canonical = json.dumps(telling, sort_keys=True, separators=(",", ":"))
-        digest = hashlib.sha256(canonical.encode()).hexdigest()[:DIGEST_LETTERS]
-        chosen = {name: section for name, section in plain.items() if section is not None}  # None: it has no component
-        return Case(digest, parts, *_parameters(chosen, points))
+        telling = [name for name in sorted(known) if name != Limits.noun or name in swept]
+        canonical = ",".join(f"{json.dumps(name)}:{known[name].text}" for name in telling)
+        digest = hashlib.sha256(f"{{{canonical}}}".encode()).hexdigest()[:DIGEST_LETTERS]
+        return Case(digest, parts, *_parameters(known, points))
 
-    def parts(self, document: Document) -> BaseModel:
-        """The validated component of each section; a section that is left out gets its default. Raises Invalid."""
+    def parts(self, document: Document) -> tuple[Mapping[str, KnownPart], type[BaseModel]]:
+        """The validated part of each section, and the model of them all; a section that is left out gets its default.
+
+        Raises Invalid.
+        """
         scene = self.named(document, Scene.noun, Scene)
         if issubclass(scene, Scene):
             sections = sections_of(scene)
@@ -136,30 +145,48 @@ class Composer:
                 )
             if default is not None:
                 _complete(document, name, default)
+            elif not (_has_kinds(section) or any(f.is_required() for f in section.contract.model_fields.values())):
+                document.setdefault(name, {})
         model = self.model(scene, sections)
+        keys = None if self._holds_instances else keys_of(document, model.model_fields)
+        found = None if keys is None else self._known.get(scene, keys)
+        if found is not None:
+            return found, model
         try:
-            return model.model_validate(document)
+            validated = model.model_validate(document)
         except ValidationError as error:
-            raise Invalid(problems_in(error, model, document)) from error
+            problems = problems_in(error, model, document)
+            if scene is Component:  # which other sections are needed is not known
+                problems = [problem for problem in problems if problem.place[0] in (Scene.noun, *document)]
+            raise Invalid(problems) from error
+        plain = self.plain(validated)
+        found = {name: KnownPart.of(name, getattr(validated, name), plain[name]) for name in model.model_fields}
+        if huge := [
+            Problem(tuple(name.split(".")), value, f"should be an integer of at most {LARGEST} in magnitude")
+            for part in found.values()
+            for name, value in part.parameters.items()
+            if isinstance(value, int) and abs(value) > LARGEST
+        ]:
+            raise Invalid(huge)
+        return (found if keys is None else self._known.shared(scene, keys, found)), model
 
     def model(self, scene: type[Component], sections: Mapping[str, Section]) -> type[BaseModel]:
         """The pydantic model of the sections of one class of scenes."""
         if scene not in self._models:
             fields: dict[str, Any] = {Scene.noun: (self.registry.union(Scene.noun), ...)}
             for name, section in sections.items():
-                if CONTRACTS.get(section.contract.noun) is section.contract:
+                if _has_kinds(section):
                     fields[name] = (self.registry.union(section.contract.noun), None if section.of else ...)
-                elif any(field.is_required() for field in section.contract.model_fields.values()):
-                    fields[name] = (section.contract, ...)
                 else:
-                    fields[name] = (section.contract, section.contract())
+                    fields[name] = (section.contract, ...)
             config = ConfigDict(extra="forbid", frozen=True)
             self._models[scene] = create_model("Parts", __config__=config, **fields)
         return self._models[scene]
 
     def plain(self, parts: BaseModel) -> dict[str, Any]:
-        """The sections as JSON values. A component whose class is not the installed one of its kind has an entry
-        `class` as well, so that cases of different classes get different digests.
+        """The sections as JSON values. A component whose class is not the one that its kind alone means has its
+        qualified kind, or, when nobody offers the class, an entry `class`: cases of different classes get different
+        digests.
 
         Raises Invalid for a field that cannot be written as JSON.
         """
@@ -169,16 +196,18 @@ class Composer:
             sentence = f"a field cannot be written as JSON, by which cases are told apart: {error}"
             raise Invalid([Problem((name,), ABSENT, sentence) for name in unwritable(parts)]) from error
         for name in plain:
-            self._add_class(plain[name], getattr(parts, name))
+            self._tell_class(plain[name], getattr(parts, name))
         return plain
 
-    def _add_class(self, plain: Any, value: object) -> None:
+    def _tell_class(self, plain: Any, value: object) -> None:
         if not isinstance(value, Component):
             return
         for name in type(value).model_fields:
-            self._add_class(plain.get(name), getattr(value, name))
-        if value.noun in CONTRACTS and not self.registry.is_installed(value):
-            plain["class"] = class_name(type(value))
+            self._tell_class(plain.get(name), getattr(value, name))
+        if value.noun not in CONTRACTS:
+            return
+        kind = self.registry.kind_of(value)
+        plain |= {"class": class_name(type(value))} if kind is None else {"kind": kind}
 
     def named(self, document: Document, section: str, contract: type[Component]) -> type[Component]:
         """The class of the component that a section names by kind or holds as an instance, or Component."""
@@ -211,7 +240,7 @@ def section_rows(registry: Registry) -> list[PluginRow]:
     for kind, scene in scenes.items():
         for name in sections_of(scene) if issubclass(scene, Scene) else ():
             askers.setdefault(name, []).append(kind)
-    found = Composer(registry, {}).all_sections
+    found = Composer(registry).all_sections
     return [
         PluginRow(
             name,
@@ -222,6 +251,10 @@ def section_rows(registry: Registry) -> list[PluginRow]:
         for name, section in found.items()
         if name in askers and section.contract not in CONTRACTS.values()
     ]
+
+
+def _has_kinds(section: Section) -> bool:
+    return CONTRACTS.get(section.contract.noun) is section.contract
 
 
 def _plain(value: Any) -> Any:
@@ -254,15 +287,16 @@ def unwritable(composition: BaseModel) -> list[str]:
     return found
 
 
-def _parameters(plain: Mapping[str, Any], points: Sequence[Point]) -> tuple[dict[str, Any], tuple[str, ...]]:
+def _parameters(known: Mapping[str, KnownPart], points: Sequence[Point]) -> tuple[dict[str, Any], tuple[str, ...]]:
     """The names of a case's settings and all its parameters, under dotted names; and the names of the swept ones."""
-    parameters = {name: json.dumps(value) if isinstance(value, list | dict) else value for name, value in leaves(plain)}
-    assigned = [name for point in points if not point.name for name in point.values]
-    swept = [
-        parameter
-        for parameter in parameters
-        if any(parameter == name or parameter.startswith(f"{name}.") for name in assigned)
-    ]
+    assigned = {name for point in points if not point.name for name in point.values}
+    below = tuple(f"{name}." for name in assigned)
+    parameters: dict[str, Any] = {}
+    swept: list[str] = []
+    for section, part in known.items():
+        parameters |= part.parameters
+        if any(name.partition(".")[0] == section for name in assigned):
+            swept += [name for name in part.parameters if name in assigned or name.startswith(below)]
     settings: dict[str, str] = {}
     for point in points:
         if point.name:

@@ -3,24 +3,26 @@
 from __future__ import annotations
 
 import itertools
-import re
-import tomllib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
+from nlsolve.registry.plugin_files import with_files
 from nlsolve.registry.problems import ABSENT, Problem, Source, StudyError, problems_in, unknown
 from nlsolve.registry.registry import Registry, load_registry
-from nlsolve.registry.toml_lines import Place, lines_of
+from nlsolve.registry.toml_lines import Place
 from nlsolve.results.columns import RUNS, is_measured, no_such_column
 from nlsolve.results.parameters import VARIANT, names_settings
 from nlsolve.results.reference_error import REFERENCE
-from nlsolve.show.figures import FigureSpec
+from nlsolve.show.expectations import Expectation
+from nlsolve.show.figures import BaseFigure, FigureSpec
 from nlsolve.show.tables import TableSpec, check
 from nlsolve.study.case import Case, Composer, Invalid
+from nlsolve.study.documents import EXTENDS, PLUGINS, read_document
+from nlsolve.study.exclusions import Exclude, Excluded, Exclusions
 from nlsolve.study.sweeps import Document, Point, Setting, Sweep, assign_all, leaves, merged, places_of, swept_places
 from nlsolve.study.timing import Timing
 
@@ -30,15 +32,29 @@ class Frame(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
+    extends: str | None = Field(
+        None,
+        description="path of a study, relative to this file, over whose entries those of this file are merged: tables "
+        "key by key, while a table with a kind, a list and any other value replace what was there",
+    )
+    plugins: tuple[str, ...] = Field(
+        (), description="plugins of one file, by their paths relative to this file; all their components can be used"
+    )
     question: str = Field(min_length=1, description="what the study finds out, in a sentence")
-    sweep: tuple[Sweep, ...] = ()
+    sweep: tuple[Sweep, ...] = Field((), description="what varies between the cases; several sweeps multiply")
+    exclude: tuple[Exclude, ...] = Field((), description="cases that are left out, with reasons")
     reference: dict[str, Any] | None = Field(
         None, description="parameters that make a case the reference its velocities are compared with"
     )
-    table: tuple[TableSpec, ...] = ()
-    figure: tuple[FigureSpec, ...] = ()
-    timing: Timing = Timing()
-    quick: dict[str, Any] = Field(default_factory=dict, description="what --quick changes")
+    table: tuple[TableSpec, ...] = Field((), description="tables of the results")
+    figure: tuple[FigureSpec, ...] = Field((), description="figures of the results")
+    expect: tuple[Expectation, ...] = Field(
+        (), description="findings that the study asserts; exit code 3 of `nlsolve run` says that one does not hold"
+    )
+    timing: Timing = Field(Timing(), description="how the cases are timed")
+    quick: dict[str, Any] = Field(
+        default_factory=dict, description="dotted parameters, and entries such as sweep, that --quick changes"
+    )
 
 
 @dataclass(frozen=True)
@@ -46,6 +62,9 @@ class Study:
     """A question, the cases that answer it, and the tables and figures to show.
 
     has_quick : whether the study has a [quick] section, which `quick=True` and --quick apply.
+    plugins : the files of plugins without installation whose components its cases may have.
+    excluded : the cases that the study leaves out.
+    expectations : what the study asserts of its results; of a quick study, what its [quick] section asserts.
     """
 
     name: str
@@ -55,6 +74,9 @@ class Study:
     figures: tuple[Any, ...] = ()
     has_quick: bool = False
     timing: Timing = field(default_factory=Timing)
+    plugins: tuple[Path, ...] = ()
+    excluded: tuple[Excluded, ...] = ()
+    expectations: tuple[Expectation, ...] = ()
 
     @classmethod
     def from_toml(
@@ -69,17 +91,8 @@ class Study:
 
         Raises StudyError with a sentence for each mistake: its line, its place, its value, and what is expected.
         """
-        try:
-            text = Path(path).read_text(encoding="utf-8")
-            document = tomllib.loads(text)
-        except OSError as error:
-            raise StudyError(f"{path}: the study cannot be read: {error.strerror}") from error
-        except UnicodeDecodeError as error:
-            raise StudyError(f"{path}: the study is not UTF-8 text: {error.reason}") from error
-        except tomllib.TOMLDecodeError as error:
-            raise StudyError(_syntax(str(path), str(error))) from error
-        source = Source(str(path), lines_of(text))
-        return _Builder(source, document, overrides or {}, quick, registry or load_registry()).study(Path(path).stem)
+        document, source = read_document(Path(path))
+        return _built(source, document, overrides or {}, quick, registry or load_registry(), Path(path).stem)
 
     @classmethod
     def from_dict(
@@ -94,7 +107,26 @@ class Study:
 
         Raises StudyError as `from_toml` does.
         """
-        return _Builder(Source(name), document, overrides or {}, quick, registry or load_registry()).study(name)
+        return _built(Source(name), document, overrides or {}, quick, registry or load_registry(), name)
+
+
+def _built(
+    source: Source,
+    document: Mapping[str, Any],
+    overrides: Mapping[str, Any],
+    quick: bool,
+    registry: Registry,
+    name: str,
+) -> Study:
+    """The study of a document, in which components inside components are those of the same registry."""
+    paths = document.get(PLUGINS, [])
+    for number, path in enumerate(paths if isinstance(paths, list | tuple) else []):
+        try:
+            registry = with_files(registry, [Path(path)] if isinstance(path, str) else [])
+        except StudyError as error:
+            raise StudyError(f"{source.at((PLUGINS, number))}: {PLUGINS}[{number}]: {error}") from error
+    with registry.in_use():
+        return _Builder(source, document, overrides, quick, registry).study(name)
 
 
 class _Builder:
@@ -104,7 +136,7 @@ class _Builder:
         self, source: Source, document: Mapping[str, Any], overrides: Mapping[str, Any], quick: bool, registry: Registry
     ) -> None:
         self.document: Document = merged({}, document)
-        self.composer = Composer(registry, self.document)
+        self.composer = Composer(registry, self.document, overrides)
         aliases = {name: source.at(place) for name, place in swept_places(self.document).items()}
         quick_values: Document = {}
         if quick:
@@ -115,12 +147,13 @@ class _Builder:
             aliases |= {name: source.at(("quick", *place)) for name, place in changed.items()}
         self.quick = quick
         self.overrides = {**quick_values, **overrides}
-        self.source = Source(source.file, source.lines, aliases | {name: f"{source.file}, --set" for name in overrides})
+        by_hand = {name: f"{source.file}, --set" for name in overrides}
+        self.source = replace(source, aliases=aliases | by_hand)
         self.refuse(assign_all(self.document, self.overrides))
 
     def study(self, name: str) -> Study:
         frame = self.frame()
-        cases = self.cases(frame)
+        cases, excluded = self.cases(frame)
         tables, problems = [], []
         for number, spec in enumerate(frame.table):
             found = check(spec, [case.parameters for case in cases])
@@ -137,13 +170,32 @@ class _Builder:
             for column in columns
             if column not in known and not is_measured(column)
         ]
+        problems += _called_alike("table", frame.table) + _called_alike("figure", frame.figure)
+        expectations = frame.expect if not self.quick or "expect" in self.document["quick"] else ()
+        names = [spec.name for spec in frame.table]
+        problems += [
+            Problem(("expect", number, *wrong.place), wrong.value, wrong.expected)
+            for number, expectation in enumerate(expectations)
+            for wrong in expectation.problems(known, names)
+        ]
         if not frame.timing.calibrate:
             lines = [("table", n) for n, spec in enumerate(frame.table) if spec.crossover is not None]
             lines += [("figure", n) for n, spec in enumerate(frame.figure) if spec.kind == "crossover"]
             asked = "a crossover is told from unit costs: set timing = { calibrate = true }"
             problems += [Problem(place, ABSENT, asked) for place in lines]
         self.refuse(problems)
-        return Study(name, frame.question, cases, tuple(tables), frame.figure, bool(frame.quick), frame.timing)
+        return Study(
+            name,
+            frame.question,
+            cases,
+            tuple(tables),
+            frame.figure,
+            has_quick=bool(frame.quick),
+            timing=frame.timing,
+            plugins=self.composer.registry.files,
+            excluded=excluded,
+            expectations=expectations,
+        )
 
     def refuse(self, problems: list[Problem]) -> None:
         self.refuse_sentences([problem.sentence(self.source) for problem in problems])
@@ -157,6 +209,9 @@ class _Builder:
         strange = [name for name in document if name not in Frame.model_fields]
         names = [*Frame.model_fields, *self.composer.sections]
         self.refuse([unknown((name,), self.document[name], "no such section", names) for name in strange])
+        if EXTENDS in document:
+            sentence = "a study in a dictionary extends none: merge the dictionaries, or write a study file"
+            self.refuse([Problem((EXTENDS,), document[EXTENDS], sentence)])
         try:
             frame = Frame.model_validate(document)
         except ValidationError as error:
@@ -173,7 +228,8 @@ class _Builder:
         )
         return frame
 
-    def cases(self, frame: Frame) -> tuple[Case, ...]:
+    def cases(self, frame: Frame) -> tuple[tuple[Case, ...], tuple[Excluded, ...]]:
+        exclusions, known = Exclusions(frame.exclude), set[str]()
         cases: dict[str, Case] = {}
         references: dict[str, Case] = {}
         sentences: list[str] = []
@@ -184,52 +240,54 @@ class _Builder:
         }
         root: Place = ("quick", "sweep") if self.quick and "sweep" in self.document["quick"] else ("sweep",)
         for points in itertools.product(*(sweep.points((*root, number)) for number, sweep in enumerate(frame.sweep))):
+            label = ", ".join(point.label for point in points)
             try:
                 case = self.combined(base, points, by_hand, named)
+                known |= case.parameters.keys()
+                if exclusions.hit(case.parameters, label):
+                    continue
                 if frame.reference is not None:
                     reference = self.reference(frame.reference, base, points, by_hand, named)
                     case = replace(case, reference=references.setdefault(reference.id, reference).id)
             except _Refused as refused:
+                known |= refused.parameters.keys()
+                if exclusions.hit(refused.parameters, label):
+                    continue
                 sentences += refused.sentences
                 continue
-            source = self.source_of(points, named, by_hand)
             twin = cases.setdefault(case.id, case)  # overrides may make two cases one
-            names = [
-                ", ".join(word for name, word in each.parameters.items() if names_settings(name))
-                for each in (twin, case)
-            ]
-            if names[0] != names[1]:
+            if twin is not case and (names := [_settings_of(twin), _settings_of(case)]) != names[:1] * 2:
                 hand = " with what is set by hand" if by_hand else ""
                 same = f"{names[0]!r} and {names[1]!r} are one and the same case{hand}: change one of them, or drop it"
                 place = next(point.place for point in points if point.name)
-                sentences.append(Problem(place, ABSENT, same).sentence(source))
+                sentences.append(Problem(place, ABSENT, same).sentence(self.source_of(points, named, by_hand)))
         self.refuse_sentences(sentences)
+        if not self.overrides:  # a study that is changed by hand or by [quick] may have fewer cases
+            self.refuse(exclusions.idle(known))
+        if not cases:
+            self.refuse([Problem(("exclude",), ABSENT, "no case is left")])
         cases = references | cases  # references first: the other cases are compared with them as they end
-        everyone = [case.parameters for case in cases.values()]
-        # Only a parameter that both cases have can differ: the defaults of one kind do not tell cases apart.
-        differing = {
-            name
-            for parameters in everyone
-            for name, value in parameters.items()
-            if any(name in other and other[name] != value for other in everyone)
-        }
-        return tuple(
+        differing = _differing([case.parameters for case in cases.values()])
+        shown = (
             replace(case, swept=tuple(name for name in case.swept if name in differing)) for case in cases.values()
         )
+        return tuple(shown), tuple(exclusions.found)
 
     def combined(self, base: Document, points: tuple[Point, ...], by_hand: Mapping[str, Any], named: set[str]) -> Case:
         """The case of one combination of points; overrides replace their values. Raises _Refused with sentences."""
-        source = self.source_of(points, named, by_hand)
         assigned = {name: value for point in points for name, value in point.values.items()}
         document = merged({}, base)
         sections_first = dict(sorted(assigned.items(), key=lambda item: item[0].count(".")))
         wrong = assign_all(document, sections_first) + assign_all(document, by_hand)
-        if wrong:
-            raise _Refused([problem.sentence(source) for problem in wrong])
         try:
+            if wrong:
+                raise Invalid(wrong)
             return self.composer.case(document, points)
         except Invalid as invalid:
-            raise _Refused([problem.sentence(source) for problem in invalid.problems]) from invalid
+            source = self.source_of(points, named, by_hand)
+            settings = {point.column: point.name for point in points if point.name}
+            sentences = [problem.sentence(source) for problem in invalid.problems]
+            raise _Refused(sentences, {**settings, **_written(document)}) from invalid
 
     def reference(
         self,
@@ -264,14 +322,46 @@ class _Builder:
 
 
 class _Refused(Exception):
-    """Raised for a combination that does not make a case; `sentences` say why, each with its place."""
+    """Raised for a combination that does not make a case.
 
-    def __init__(self, sentences: list[str]) -> None:
+    sentences : why, each with its place.
+    parameters : the values that were written, by dotted name.
+    """
+
+    def __init__(self, sentences: list[str], parameters: Mapping[str, Any]) -> None:
         super().__init__()
-        self.sentences = sentences
+        self.sentences, self.parameters = sentences, parameters
 
 
-def _syntax(path: str, message: str) -> str:
-    found = re.search(r"\(at line (\d+), column (\d+)\)", message)
-    where = f", line {found[1]}, column {found[2]}" if found else ""
-    return f"{path}{where}: not valid TOML: {message.split(' (at ')[0]}"
+def _written(document: Document) -> dict[str, Any]:
+    """The values of a document by dotted name; a word may be short for a table with that kind."""
+    written = dict(leaves(document))
+    return {f"{name}.kind": value for name, value in written.items() if isinstance(value, str)} | written
+
+
+def _settings_of(case: Case) -> str:
+    """The names of the settings that a case was made by."""
+    return ", ".join(word for name, word in case.parameters.items() if names_settings(name))
+
+
+def _called_alike(noun: str, specs: Sequence[TableSpec | BaseFigure]) -> list[Problem]:
+    """A problem for each table or figure whose files would replace those of an earlier one."""
+    problems, names = [], set[str]()
+    for number, spec in enumerate(specs):
+        if spec.name.casefold() in names:
+            sentence = f"another {noun} has this name, perhaps in other letter case; its files would be replaced"
+            problems.append(Problem((noun, number, "name"), spec.name, sentence))
+        names.add(spec.name.casefold())
+    return problems
+
+
+def _differing(everyone: Sequence[Mapping[str, Any]]) -> set[str]:
+    """The parameters of which two cases that have them hold different values: the defaults of one kind tell no cases
+    apart."""
+    first: dict[str, Any] = {}
+    differing: set[str] = set()
+    for parameters in everyone:
+        for name, value in parameters.items():
+            if name not in differing and first.setdefault(name, value) != value:
+                differing.add(name)
+    return differing

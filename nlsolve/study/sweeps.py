@@ -17,9 +17,14 @@ from nlsolve.registry.problems import Problem, StudyError
 from nlsolve.registry.toml_lines import Place
 from nlsolve.results.aggregates import COUNT, WITHIN
 from nlsolve.results.parameters import VARIANT, names_settings
+from nlsolve.results.selection import Names
 from nlsolve.results.verdicts import OUTCOME, SOLVED, SPEEDUP
+from nlsolve.study.generators import Values, is_generator
 
 Document = dict[str, Any]
+
+GRIDS = ("grid", "zip")
+"""Entries of a sweep that have a table of parameters with their values."""
 
 
 @dataclass(frozen=True)
@@ -36,6 +41,11 @@ class Point:
     place: Place = ()
     places: Mapping[str, Place] = field(default_factory=dict)
 
+    @property
+    def label(self) -> str:
+        """The point as text for people."""
+        return self.name or ", ".join(f"{name} = {value}" for name, value in self.values.items())
+
 
 class Setting(BaseModel):
     """A named table of assignments; an empty one leaves the study unchanged."""
@@ -51,13 +61,31 @@ class Setting(BaseModel):
         return Point(dict(leaves(table, whole_kinds=True)), self.name, column, place, places)
 
 
+class Repeat(BaseModel):
+    """Seeds first, first + 1, …, one a repetition; several seeds go side by side."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    times: int = Field(gt=0, description="number of repetitions")
+    seeds: Names = Field(min_length=1, description='parameter or parameters that are seeds: "start.seed"')
+    first: int = Field(0, description="the first seed")
+
+    @property
+    def columns(self) -> dict[str, list[int]]:
+        """The seeds under the dotted name of each parameter."""
+        return {name: list(range(self.first, self.first + self.times)) for name in self.seeds}
+
+
 class Sweep(BaseModel):
-    """Values for parameters: every combination (`grid`), side by side (`zip`), or named settings one by one (`each`).
+    """Values for parameters: every combination (`grid`), side by side (`zip`), named settings one by one (`each`), or
+    the same with other seeds (`repeat`).
 
     grid = { law.index = [1.0, 0.5], physics.penalty = [0.0, 1e2] }                        four points
+    grid = { "law.index" = { linspace = [0.1, 1.0, 10] } }                                 ten points
     zip = { law.index = [1.0, 0.5], physics.penalty = [0.0, 1e2] }                         two points
     each = [ { name = "p = 40", solver = { kind = "anm", order = 40 } },
              { name = "ε₀ = 10", "law.regularization" = 10.0 }, { name = "as it is" } ]  three points
+    repeat = { times = 20, seeds = "start.seed" }                                         twenty points
 
     A table with a `kind` replaces its whole section. The names of settings are written to a column of `runs`: to
     `variant`, or to the one that the sweep's `name` gives; names from several sweeps in one column are joined by
@@ -66,9 +94,10 @@ class Sweep(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
-    grid: dict[str, list[Any]] | None = Field(None, description="parameter -> values; all combinations")
-    zip: dict[str, list[Any]] | None = Field(None, description="parameter -> values; the first of each, the second, …")
+    grid: dict[str, Values] | None = Field(None, description="parameter -> values; all combinations")
+    zip: dict[str, Values] | None = Field(None, description="parameter -> values; the first of each, the second, …")
     each: tuple[Setting, ...] | None = Field(None, description="named tables of assignments; one after the other")
+    repeat: Repeat | None = Field(None, description="the same with other seeds")
     name: str = Field(
         VARIANT, pattern=r"^[A-Za-z][A-Za-z0-9_-]*$", description="column of `runs` for the names of each"
     )
@@ -79,12 +108,15 @@ class Sweep(BaseModel):
         """{ solver.order = […] } and { "solver.order" = […] } mean the same."""
         if not isinstance(data, dict):
             return data
-        return {mode: dict(leaves(table)) if isinstance(table, dict) else table for mode, table in data.items()}
+        return {
+            mode: dict(leaves(table, generators=True)) if isinstance(table, dict) and mode in GRIDS else table
+            for mode, table in data.items()
+        }
 
     @model_validator(mode="after")
     def _values(self) -> Sweep:
-        if sum(mode is not None for mode in (self.grid, self.zip, self.each)) != 1:
-            raise ValueError("a sweep has one of grid, zip and each")
+        if sum(mode is not None for mode in (self.grid, self.zip, self.each, self.repeat)) != 1:
+            raise ValueError("a sweep has one of grid, zip, each and repeat")
         if not names_settings(self.name) or self.name in (OUTCOME, SOLVED, SPEEDUP, WITHIN, COUNT):
             raise ValueError(f"name = {self.name!r} is a column of the results already; choose another")
         if self.each is None and self.name != VARIANT:
@@ -104,6 +136,8 @@ class Sweep(BaseModel):
     @property
     def columns(self) -> dict[str, list[Any]]:
         """The swept values of each parameter, under its dotted name."""
+        if self.repeat is not None:
+            return dict(self.repeat.columns)
         if self.each is None:
             return self.grid or self.zip or {}
         found: dict[str, list[Any]] = {}
@@ -117,18 +151,24 @@ class Sweep(BaseModel):
         if self.each is not None:
             return [setting.point((*place, "each", number), self.name) for number, setting in enumerate(self.each)]
         rows = (
-            itertools.product(*self.columns.values()) if self.zip is None else zip(*self.columns.values(), strict=True)
+            zip(*self.columns.values(), strict=True) if self.grid is None else itertools.product(*self.columns.values())
         )
         return [Point(dict(zip(self.columns, row, strict=True))) for row in rows]
 
 
 def assign_all(document: Document, values: Mapping[str, Any]) -> list[Problem]:
-    """Set values in a document by dotted name; a problem for each name that leads through a value that is no table."""
+    """Set values in a document by dotted name; a problem for each name that leads through a value that is no table.
+
+    A word inside a section is short for a table with that kind: over range = "ratio", solver.range.most = 2.0 sets
+    range = { kind = "ratio", most = 2.0 }.
+    """
     problems = []
     for name, value in values.items():
         *parents, last = name.split(".")
         table = document
         for depth, part in enumerate(parents):
+            if depth and isinstance(table.get(part), str):
+                table[part] = {"kind": table[part]}
             table = table.setdefault(part, {})
             if not isinstance(table, dict):
                 above = ".".join(parents[: depth + 1])
@@ -142,37 +182,58 @@ def assign_all(document: Document, values: Mapping[str, Any]) -> list[Problem]:
 def merged(old: Any, new: Any) -> Any:
     """`new` merged over `old`: a component, or a table with a `kind`, replaces `old`; other tables are merged into it.
 
-    A component becomes a table that remembers its class, so that its fields can be set one by one.
+    A component becomes a table that remembers its class, so that its fields can be set one by one. A table without a
+    kind is merged into a word as into the table with that kind.
     """
     if isinstance(new, Component):
         new = table_of(new)
     if isinstance(new, Mapping):
         whole = isinstance(new, ComponentTable) or "kind" in new
-        under = old if isinstance(old, dict) and not whole else {}
+        under = {} if whole else {"kind": old} if isinstance(old, str) else old if isinstance(old, dict) else {}
         table = {**under, **{name: merged(under.get(name), value) for name, value in new.items()}}
         origin = new if whole else under
         return ComponentTable(origin.cls, table) if isinstance(origin, ComponentTable) else table
-    return deepcopy(new)
+    return new if isinstance(new, str | int | float) else deepcopy(new)  # deepcopy is slow, and most are such
 
 
-def leaves(table: Mapping[str, Any], above: str = "", whole_kinds: bool = False) -> Iterator[tuple[str, Any]]:
-    """Dotted name and value of every entry that is no table; with `whole_kinds`, a table with a `kind` is a value."""
+def leaves(
+    table: Mapping[str, Any], above: str = "", whole_kinds: bool = False, generators: bool = False
+) -> Iterator[tuple[str, Any]]:
+    """Dotted name and value of every entry that is no table.
+
+    whole_kinds, generators : whether a table with a `kind`, and one that generates values, is a value.
+    """
     for name, value in table.items():
-        if isinstance(value, Mapping) and value and not (whole_kinds and "kind" in value):
-            yield from leaves(value, f"{above}{name}.", whole_kinds)
+        dotted = f"{above}{name}"
+        whole = isinstance(value, Mapping) and (
+            not value or (whole_kinds and "kind" in value) or (generators and is_generator(dotted, value))
+        )
+        if isinstance(value, Mapping) and not whole:
+            yield from leaves(value, f"{dotted}.", whole_kinds, generators)
         else:
-            yield f"{above}{name}", value
+            yield dotted, value
 
 
 def swept_places(document: Document) -> dict[str, Place]:
     """Where a document has the values of each swept parameter. The document need not be valid."""
     sweeps = document.get("sweep")
     return {
-        name: ("sweep", number, mode, *inside, *place)
+        name: ("sweep", number, mode, *place)
         for number, sweep in enumerate(sweeps if isinstance(sweeps, list) else [])
         for mode, written in (sweep.items() if isinstance(sweep, dict) else ())
+        for name, place in _places_in_sweep(mode, written).items()
+    }
+
+
+def _places_in_sweep(mode: str, written: Any) -> dict[str, Place]:
+    """Where one entry of a sweep has the values of each parameter."""
+    if mode == "repeat":
+        seeds = written.get("seeds", []) if isinstance(written, dict) else []
+        return {name: ("seeds",) for name in ([seeds] if isinstance(seeds, str) else seeds) if isinstance(name, str)}
+    return {
+        name: (*inside, *place)
         for inside, table in _tables_in(written)
-        for name, place in places_of(table, whole_kinds=mode == "each").items()
+        for name, place in places_of(table, whole_kinds=mode == "each", generators=mode in GRIDS).items()
         if name != "name"
     }
 
@@ -183,9 +244,9 @@ def _tables_in(written: Any) -> list[tuple[Place, Mapping[str, Any]]]:
     return [((place,) if isinstance(place, int) else (), table) for place, table in found if isinstance(table, dict)]
 
 
-def places_of(table: Mapping[str, Any], whole_kinds: bool = False) -> dict[str, Place]:
+def places_of(table: Mapping[str, Any], whole_kinds: bool = False, generators: bool = False) -> dict[str, Place]:
     """Dotted names in a table, and the keys they are written with: "a.b" is either a."b" or a.b."""
-    names = [name for name, _ in leaves(table, whole_kinds=whole_kinds)]
+    names = [name for name, _ in leaves(table, whole_kinds=whole_kinds, generators=generators)]
     return {name: (name,) if name in table else tuple(name.split(".")) for name in names}
 
 

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import json
+import os
 from importlib.metadata import version
 
 import pytest
-from fakes import Newton, Plugin, fake_march, registry_of, write_study
+from fakes import STUDY, Newton, Plugin, fake_march, registry_of, write_study
 from typer.testing import CliRunner
 
 from nlsolve.cli.app import app
+from nlsolve.registry.registry import DISABLE, load_registry
 
 BARS = {"FORCE_COLOR": "1", "TERM": "xterm", "COLUMNS": "200"}
 
@@ -17,7 +19,7 @@ BARS = {"FORCE_COLOR": "1", "TERM": "xterm", "COLUMNS": "200"}
 @pytest.fixture(autouse=True)
 def fake(monkeypatch, tmp_path):
     monkeypatch.setattr("nlsolve.study.study.load_registry", registry_of)
-    monkeypatch.setattr("nlsolve.cli.app.load_registry", registry_of)
+    monkeypatch.setattr("nlsolve.cli.options.load_registry", registry_of)
     monkeypatch.setattr("nlsolve.running.engines.execution.run_case", fake_march)
     monkeypatch.chdir(tmp_path)
 
@@ -203,11 +205,12 @@ def test_plugins_and_why_one_failed(monkeypatch):
     registry = registry_of()
     registry.add(Plugin(Newton), "another 2.0")
     registry.add(object(), "broken 0.1")
-    monkeypatch.setattr("nlsolve.cli.app.load_registry", lambda: registry)
+    monkeypatch.setattr("nlsolve.cli.options.load_registry", lambda: registry)
     result = nlsolve("plugins")
     assert result.exit_code == 0
     assert "order: int = 20  p" in result.stdout
-    assert "offered by fakes 1.0 and another 2.0: uninstall all but one" in result.stdout
+    assert "fakes:newton" in result.stdout
+    assert "another:newton" in result.stdout
     assert "it has no function nlsolve_components" in result.stdout
     rows = json.loads(nlsolve("plugins", "--json").stdout)
     anm = next(row for row in rows if row["kind"] == "anm")
@@ -216,12 +219,121 @@ def test_plugins_and_why_one_failed(monkeypatch):
 
 
 def test_plugins_lists_the_fields_of_sections_without_kinds(monkeypatch):
-    monkeypatch.setattr("nlsolve.cli.app.load_registry", registry_of)
+    monkeypatch.setattr("nlsolve.cli.options.load_registry", registry_of)
     rows = {row["noun"]: row for row in json.loads(nlsolve("plugins", "--json").stdout) if not row["kind"]}
     assert set(rows) == {"physics", "time", "motion", "start", "record", "stop", "budget", "limits"}
     assert rows["time"]["source"] == "nlsolve, for every scene"
     assert [field["name"] for field in rows["time"]["parameters"]] == ["horizon", "increment"]
     assert "divergence_tolerance" in nlsolve("plugins").stdout
+
+
+def test_many_rows_are_lines_without_rules(tmp_path):
+    orders = ("[10, 20]", str(list(range(2, 303))))
+    lines = nlsolve("plan", write_study(tmp_path, orders)).stdout.splitlines()
+    assert lines[0] == "602 cases"
+    assert lines[1].split()[:3] == ["case", "solver.order", "solver.tolerance"]
+    assert [line.split()[1:3] for line in lines[2:4]] == [["2", "1e-06"], ["2", "1e-08"]]
+    assert "━" not in "".join(lines)
+    tall = (
+        ('columns = "solver.tolerance"\n', ""),
+        ('rows = "solver.order"', 'rows = ["solver.order", "solver.tolerance"]'),
+    )
+    printed = nlsolve("run", write_study(tmp_path, orders, *tall)).stdout
+    assert "branches\nsolver.order  solver.tolerance  tangents\n2             1e-06             " in printed
+
+
+EXPECT = """
+[[expect]]
+that = "Order 20 needs few tangents."
+column = "tangents"
+where = { "solver.order" = 20 }
+at_most = 40
+[[expect]]
+table = "branches"
+column = "solver.tolerance = 1e-06"
+by = "solver.order"
+order = [20, 10]
+[quick]"""
+
+
+def test_findings_are_judged_and_3_says_that_one_does_not_hold(tmp_path):
+    result = nlsolve("run", write_study(tmp_path, ("\n[quick]", EXPECT)))
+    assert result.exit_code == 0
+    assert "found, as expected: Order 20 needs few tangents.\n" in result.stderr
+    wrong = ("at_most = 40", "at_most = 39")
+    path = write_study(tmp_path, ("\n[quick]", EXPECT), wrong)
+    result = nlsolve("run", path)
+    assert result.exit_code == 3
+    assert "not found, though expected: Order 20 needs few tangents.: case " in result.stderr
+    findings = json.loads(nlsolve("run", path, "--json").stdout)["findings"]
+    assert [bool(finding["refutation"]) for finding in findings] == [True, False]
+    assert nlsolve("run", path, "--quick").exit_code == 0
+    quick = ("sweep = [{", 'expect = [{ column = "tangents", at_most = 0 }]\nsweep = [{')
+    assert nlsolve("run", write_study(tmp_path, quick), "--quick").exit_code == 3
+
+
+def test_what_is_left_out_is_said(tmp_path):
+    rule = '[[exclude]]\nwhere = { "solver.order" = 20 }\nreason = "it takes a day"\n[quick]'
+    path = write_study(tmp_path, ("[quick]", rule))
+    for command in ("validate", "plan", "run"):
+        assert "left out: 2 cases: it takes a day\n" in nlsolve(command, path).stderr
+    excluded = json.loads(nlsolve("validate", path, "--json").stdout)["excluded"]
+    assert excluded[0] == {"label": "solver.order = 20, solver.tolerance = 1e-06", "reason": "it takes a day"}
+
+
+HALF = """
+from typing import Any, Literal
+
+from nlsolve.plugin import NonlinearSolver, Step
+
+
+class Half(NonlinearSolver):
+    kind: Literal["half"] = "half"
+
+    def steps(self, problem: Any, tangent: Any, start: Any) -> Any:
+        yield Step(start)
+"""
+
+
+def test_a_plugin_of_one_file(tmp_path):
+    path = write_study(tmp_path, ('kind = "anm"', 'kind = "half"'), text=STUDY[: STUDY.index("[[sweep]]")])
+    assert nlsolve("validate", path).exit_code == 2
+    (tmp_path / "half.py").write_text(HALF, encoding="utf-8")
+    for command in ("validate", "run"):
+        assert nlsolve(command, path, "--plugin", "half.py").exit_code == 0
+    assert "half (half.py)" in nlsolve("plugins", "--plugin", "half.py").stdout
+    result = nlsolve("plan", path, "--plugin", "nowhere.py")
+    assert (result.exit_code, result.stderr) == (
+        2,
+        "the plugin nowhere.py cannot be read: No such file or directory\n",
+    )
+
+
+def test_the_schema_has_what_is_installed(tmp_path):
+    (tmp_path / "half.py").write_text(HALF, encoding="utf-8")
+    document = json.loads(nlsolve("schema", "--plugin", "half.py").stdout)
+    kinds = {
+        kind
+        for part in document["$defs"].values()
+        for kind in part.get("properties", {}).get("kind", {}).get("enum", [])
+    }
+    assert {"box", "anm", "half", "half:half"} <= kinds
+
+
+def test_a_disabled_plugin(monkeypatch, tmp_path):
+    monkeypatch.setenv(DISABLE, "systems")
+    monkeypatch.setattr("nlsolve.cli.options.load_registry", load_registry)
+    result = nlsolve("plugins", "--disable-plugin", "solvers")
+    assert "nlsolve 0.1.0 (nlsolve_solvers)" in result.stdout
+    assert "disabled" in result.stdout
+    assert "levenberg-marquardt" not in result.stdout
+    assert "bratu" not in result.stdout
+    assert os.environ[DISABLE] == "systems,solvers"
+    result = nlsolve("validate", write_study(tmp_path), "--disable-plugin", "solver")
+    assert (result.exit_code, result.stderr) == (
+        2,
+        "--disable-plugin solver: no such plugin; did you mean 'solvers'?\n",
+    )
 
 
 def test_version():

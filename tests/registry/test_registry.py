@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib.metadata
 import sys
+from pathlib import Path
 from typing import Any, ClassVar, Literal
 
 import pytest
@@ -11,7 +12,7 @@ from fakes import COMPONENTS, Homotopy, Honey, Newton, Plugin, registry_of
 from pydantic import TypeAdapter, ValidationError
 
 from nlsolve.plugin import NonlinearSolver, hookimpl
-from nlsolve.registry.registry import CONTRACTS, Registry, load_registry
+from nlsolve.registry.registry import CONTRACTS, Registry, load_registry, registry_in_use
 
 
 class OtherNewton(Newton):
@@ -29,6 +30,12 @@ class LooseKind(NoKind):
     """A name that is no literal."""
 
     kind: str = "loose"
+
+
+class Qualified(NoKind):
+    """A name with a package in it."""
+
+    kind: Literal["mine:newton"] = "mine:newton"
 
 
 class Unfinished(NonlinearSolver):
@@ -160,11 +167,54 @@ def test_two_plugins_with_one_name():
     registry = registry_of(Newton, Homotopy)
     registry.add(Plugin(OtherNewton), "other 2.0")
     assert registry.classes("solver") == {"anm": Homotopy}
-    sentence = "solver 'newton' is offered by fakes 1.0 and other 2.0: uninstall all but one"
+    sentence = "solver 'newton' is offered by fakes 1.0 and other 2.0: ask for 'fakes:newton' or 'other:newton'"
     assert registry.complaint("solver", "newton") == sentence
-    assert failures(registry) == [sentence, sentence]
+    section = TypeAdapter(registry.union("solver"))
     with pytest.raises(ValidationError, match=sentence):
-        TypeAdapter(registry.union("solver")).validate_python({"kind": "newton"})
+        section.validate_python({"kind": "newton"})
+    assert type(section.validate_python({"kind": "fakes:newton"})) is Newton
+    assert type(section.validate_python({"kind": "other:newton"})) is OtherNewton
+    assert failures(registry) == []
+    assert [row.kind for row in registry.plugins()] == ["anm", "fakes:newton", "other:newton"]
+    with pytest.raises(ValidationError, match="'third' offers no solver 'newton'; it is offered as fakes:newton"):
+        section.validate_python({"kind": "third:newton"})
+    with pytest.raises(ValidationError, match="'fakes' offers no solver 'nwton'; nothing offers a solver of this kind"):
+        section.validate_python({"kind": "fakes:nwton"})
+
+
+def test_the_first_party_kind_is_the_default():
+    registry = Registry()
+    registry.add(Plugin(OtherNewton), "other 2.0")
+    registry.add(Plugin(Newton), "nlsolve 0.1")
+    assert registry.classes("solver") == {"newton": Newton}
+    assert registry.class_called("solver", "nlsolve:newton") is Newton
+    assert registry.class_called("solver", "other:newton") is OtherNewton
+    assert [registry.kind_of(solver) for solver in (Newton(), OtherNewton(), Homotopy())] == [
+        "newton",
+        "other:newton",
+        None,
+    ]
+    assert [(row.kind, row.failure) for row in registry.plugins()] == [("other:newton", None), ("newton", None)]
+
+
+def test_one_package_that_offers_a_kind_twice():
+    registry = registry_of(Newton, OtherNewton)
+    sentence = "solver 'fakes:newton' is offered by fakes 1.0 and fakes 1.0: uninstall all but one"
+    assert registry.classes("solver") == {}
+    assert failures(registry) == [sentence, sentence]
+
+
+def test_a_registry_with_more_classes_leaves_the_first_as_it_was():
+    registry = registry_of(Newton)
+    wider = registry.with_([Homotopy], "more (more.py)", Path("more.py"))
+    assert list(registry.classes("solver")) == ["newton"]
+    assert list(wider.classes("solver")) == ["anm", "newton"]
+    assert (registry.files, wider.files) == ((), (Path("more.py"),))
+    assert wider.class_called("solver", "more:anm") is Homotopy
+    assert registry_in_use() is load_registry()
+    with wider.in_use():
+        assert registry_in_use() is wider
+    assert registry_in_use() is load_registry()
 
 
 @pytest.mark.parametrize(
@@ -182,6 +232,7 @@ def test_two_plugins_with_one_name():
         (Plugin(int), "TypeError: <class 'int'> is not a subclass of one of Scene, ConstitutiveLaw, "),
         (Plugin(NoKind), 'NoKind must declare its name: kind: Literal["name"] = "name"'),
         (Plugin(LooseKind), 'LooseKind must declare its name: kind: Literal["name"] = "name"'),
+        (Plugin(Qualified), "Qualified has the kind 'mine:newton': a kind has no ':', which packages end with"),
         (Plugin(Unfinished), "Unfinished leaves methods of its contract out: steps"),
     ],
 )

@@ -141,7 +141,7 @@ def registry() -> Registry:
 @pytest.fixture
 def shell(registry: Registry, monkeypatch: pytest.MonkeyPatch) -> Any:
     """The command line, for which the stranger is installed."""
-    monkeypatch.setattr("nlsolve.study.study.load_registry", lambda: registry)
+    monkeypatch.setattr("nlsolve.cli.options.load_registry", lambda: registry)
     return lambda *arguments: CliRunner().invoke(app, [str(argument) for argument in arguments])
 
 

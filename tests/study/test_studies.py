@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import tomllib
+from time import process_time
 from typing import Any
 
 import pytest
 from fakes import STUDY, Box, Homotopy, Newton, registry_of, write_study
 
 from nlsolve.registry.problems import MOVED, StudyError
-from nlsolve.registry.toml_lines import lines_of, nearest_line
+from nlsolve.registry.toml_lines import lines_of, nearest_place
 from nlsolve.study.case import Composer
 from nlsolve.study.study import Frame, Study
-from nlsolve.study.sweeps import parse_assignments
+from nlsolve.study.sweeps import assign_all, merged, parse_assignments
 
 REGISTRY = registry_of()
 
@@ -102,6 +103,44 @@ class TestCases:
         document = {name: value for name, value in document.items() if name not in ("table", "quick")}
         (case,) = Study.from_dict(document, registry=REGISTRY).cases
         assert (case.parts.scene.side, case.parts.solver) == ("right", Newton())
+
+
+class TestManyCases:
+    GRID = '{ "solver.order" = [10, 20], "solver.tolerance" = [1e-6, 1e-8] }'
+
+    def of(self, orders: int, tolerances: int) -> Study:
+        """A study of orders × tolerances cases."""
+        grid = {"solver.order": list(range(2, 2 + orders)), "law.index": [1.0 + k for k in range(tolerances)]}
+        table = {"name": "t", "rows": "solver.order", "columns": "law.index", "value": "tangents"}
+        return Study.from_dict({**tomllib.loads(STUDY), "sweep": [{"grid": grid}], "table": [table]}, registry=REGISTRY)
+
+    def test_a_section_is_validated_once_a_distinct_table(self, monkeypatch):
+        validated = []
+        component = type(REGISTRY).component
+        monkeypatch.setattr(type(REGISTRY), "component", lambda *asked: validated.append(asked) or component(*asked))
+        cases = self.of(30, 20).cases
+        assert len(cases) == len({case.id for case in cases}) == 600
+        assert len({id(case.parts.solver) for case in cases}) == 30
+        assert len({id(case.parts.law) for case in cases}) == 20
+        assert len(validated) < 600
+
+    def test_ten_thousand_cases_take_less_than_five_seconds(self):
+        begun = process_time()
+        study = self.of(100, 100)
+        assert process_time() - begun < 5.0
+        assert len(study.cases) == 10_000
+        assert study.cases[-1].swept == ("law.index", "solver.order")
+
+    def test_values_that_json_cannot_hold_are_validated_each_time(self, tmp_path):
+        grid = '{ "law.index" = [0.5, 1979-05-27] }'
+        message = complaint(
+            tmp_path, (self.GRID, grid), ('rows = "solver.order"\ncolumns = "solver.tolerance"', 'rows = "law.index"')
+        )
+        assert "line 16: law.index = datetime.date(1979, 5, 27): should be a valid number" in message
+
+    def test_numbers_of_two_types_are_not_mixed_up(self, tmp_path):
+        message = complaint(tmp_path, ("[10, 20]", "[10, 10.5]"))
+        assert "line 16: solver.order = 10.5: should be a valid integer" in message
 
 
 SETTINGS = """each = [
@@ -285,9 +324,10 @@ class TestComplaints:
         assert "should be 'auto'" in message
 
     def test_missing_sections_kinds_and_question(self, tmp_path):
-        message = complaint(tmp_path, ('[law]\nkind = "honey"\n', ""), ('kind = "box"', ""))
-        assert "/study.toml: law: required, and missing" in message
-        assert "/study.toml, line 3: scene.kind: required, and missing; installed: box" in message
+        without_law = ('[law]\nkind = "honey"\n', "")
+        assert complaint(tmp_path, without_law) == "/study.toml: law: required, and missing"
+        message = complaint(tmp_path, without_law, ('kind = "box"', ""))  # nobody knows what the scene needs
+        assert message == "/study.toml, line 3: scene.kind: required, and missing; installed: box"
         assert "question: required, and missing" in complaint(tmp_path, ('question = "How many branches?"', ""))
 
     def test_unknown_section(self, tmp_path):
@@ -306,7 +346,9 @@ class TestComplaints:
 
     def test_sweep_without_values_or_with_two_modes(self, tmp_path):
         assert "'solver.order' has no values" in complaint(tmp_path, ("[10, 20]", "[]"))
-        assert "a sweep has one of grid, zip and each" in complaint(tmp_path, ("[[table]]", "[[sweep]]\n[[table]]"))
+        assert "a sweep has one of grid, zip, each and repeat" in complaint(
+            tmp_path, ("[[table]]", "[[sweep]]\n[[table]]")
+        )
 
     def test_claim_needs_a_solver_that_claims(self, tmp_path):
         assert read(tmp_path, ("[solver]", '[stop]\nkind = "claim"\n[solver]')).cases[0].parts.stop.kind == "claim"
@@ -478,7 +520,7 @@ class TestMoved:
         assert complaint(tmp_path, overrides={"record": [0.1, 0.2]}) == f"/study.toml, --set: {told}"
 
     def test_every_new_place_exists(self):
-        known = {*Composer(REGISTRY, {}).sections, *Frame.model_fields}
+        known = {*Composer(REGISTRY).sections, *Frame.model_fields}
         assert all(new.split(".")[0] in known for new in MOVED.values())
         assert not any(old in known for old in MOVED)
         parts = read_parts()
@@ -512,11 +554,28 @@ k = 2
         assert lines[("list", 0, "k")] == 9
         assert lines[("list", 0, "sub", "m")] == 11
         assert lines[("list", 1, "k")] == 13
-        assert nearest_line(lines, ("list", 1, "absent", "deep")) == 12
-        assert nearest_line(lines, ("absent",)) is None
+        assert nearest_place(lines, ("list", 1, "absent", "deep")) == ("list", 1)
+        assert lines["list", 1] == 12
+        assert nearest_place(lines, ("absent",)) is None
 
 
 class TestAssignments:
+    @pytest.mark.parametrize("sweep", [[], [{"grid": {"solver.range": ["ratio", "last-term"]}}]])
+    def test_a_word_is_short_for_a_table_with_that_kind(self, sweep):
+        solver = {"kind": "anm", "range": "ratio"}
+        document = {"question": "q", "scene": {"kind": "bratu", "nodes": 4}, "solver": solver, "sweep": sweep}
+        (case,) = Study.from_dict(document, {"solver.range.kind": "pade-pair"}).cases
+        assert case.parameters["solver.range.kind"] == "pade-pair"
+        with pytest.raises(StudyError, match=r"study, --set: solver.range.part = 2: no such field"):
+            Study.from_dict(document, {"solver.range.part": 2})
+        quick = {"solver": {"range": {"kind": "nearest-pole"}, "order": 5}}
+        (case,) = Study.from_dict(document | {"sweep": [], "quick": quick}, quick=True).cases
+        assert case.parameters["solver.range.kind"] == "nearest-pole"
+        filled = {"solver": {"range": "half"}}
+        assert assign_all(filled, {"solver.range.part": 0.1}) == []
+        assert filled == {"solver": {"range": {"kind": "half", "part": 0.1}}}
+        assert merged("half", {"part": 0.1}) == {"kind": "half", "part": 0.1}
+
     def test_values_are_toml_or_else_text(self):
         parsed = parse_assignments(["a.b=1e-3", "c = true", "d=spin", 'e={ kind = "x" }', "f=a=b"])
         assert parsed == {"a.b": 1e-3, "c": True, "d": "spin", "e": {"kind": "x"}, "f": "a=b"}

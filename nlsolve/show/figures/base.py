@@ -26,7 +26,7 @@ class BaseFigure(Component, ABC):
 
     noun: ClassVar[str] = "figure"
 
-    name: str = Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_-]*$", description="stem of the files written")
+    name: str = Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_-]*$", max_length=100, description="stem of the files written")
     caption: str = Field("", description="sentence under the figure in the report")
     title: str | None = Field(None, description="heading inside the figure; papers do without")
     where: Where = Field(

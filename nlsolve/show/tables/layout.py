@@ -32,15 +32,15 @@ def build(spec: TableSpec, runs: pd.DataFrame) -> Table:
     if problems:
         raise StudyError(*(problem.sentence(Source(f"table {spec.name!r}")) for problem in problems))
     chosen = spec.aggregated([run for run in known if fits(run, spec.where)])
-    rows = list(dict.fromkeys(key_of(spec.labels, run) for run in chosen))
-    columns = list(dict.fromkeys(key for run in chosen for key in _column_keys(spec, run)))
+    rows = _numbered(key_of(spec.labels, run) for run in chosen)
+    columns = _numbered(key for run in chosen for key in _column_keys(spec, run))
     cells = np.full((len(rows), len(columns)), 0 if spec.count else np.nan, dtype=object)
     for run in chosen:
         for value, key in zip(spec.shown, _column_keys(spec, run), strict=True):
             failed = not spec.aggregates and status_of(run) not in AT_A_SOLUTION
-            cells[rows.index(key_of(spec.labels, run)), columns.index(key)] = run.get("status" if failed else value)
+            cells[rows[key_of(spec.labels, run)], columns[key]] = run.get("status" if failed else value)
     names = (*spec.columns, "") if spec.columns and len(spec.shown) > 1 else spec.columns or ("",)
-    index, header = _index(rows, spec.labels), _index(columns, names)
+    index, header = _index(list(rows), spec.labels), _index(list(columns), names)
     frame = pd.DataFrame(cells, index=index, columns=header, dtype=object)
     if spec.paper is None:
         return Table(spec, frame)
@@ -119,6 +119,11 @@ def _column_keys(spec: TableSpec, run: Run) -> list[tuple[Any, ...]]:
     if spec.columns and len(spec.shown) == 1:
         return [key_of(spec.columns, run)]
     return [(*key_of(spec.columns, run), value) for value in spec.shown]
+
+
+def _numbered(keys: Iterable[tuple[Any, ...]]) -> dict[tuple[Any, ...], int]:
+    """The different keys in their order, each with its number."""
+    return {key: number for number, key in enumerate(dict.fromkeys(keys))}
 
 
 def _index(keys: list[tuple[Any, ...]], names: tuple[str, ...]) -> pd.Index:

@@ -24,7 +24,7 @@ class TableSpec(Component):
 
     noun: ClassVar[str] = "table"
 
-    name: str = Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_-]*$", description="stem of the files written")
+    name: str = Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_-]*$", max_length=100, description="stem of the files written")
     rows: Names = Field(
         (), description="column or columns of `runs` that tell the rows apart; may be absent with cheapest"
     )

@@ -52,6 +52,10 @@ class Table:
             frames[f"{self.spec.name}: measured ({self.spec.paper.source}) verdict"] = self.comparison
         return {title: frame.rename(index=_word, columns=_word) for title, frame in frames.items()}
 
+    def flat(self) -> dict[str, pd.DataFrame]:
+        """What `frames` holds, the labels of rows as columns."""
+        return {title: _flat(frame) for title, frame in self.frames().items()}
+
     def rich(self) -> list[RichTable]:
         """What `frames` holds, for a terminal."""
         return [_rich(title, frame) for title, frame in self.frames().items()]

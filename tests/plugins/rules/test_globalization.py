@@ -21,7 +21,6 @@ from scipy.sparse import csr_array
 
 from nlsolve import Status, Study
 from nlsolve.plugin import Globalization
-from nlsolve.registry import nested
 from nlsolve.registry.problems import StudyError
 from nlsolve.registry.registry import Registry, load_registry
 from nlsolve.series import Array
@@ -201,11 +200,11 @@ def test_a_table_becomes_the_installed_component_and_a_component_stays() -> None
     assert Newton.model_validate_json(solver.model_dump_json()) == solver
 
 
-def test_a_strangers_globalization_is_taken(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_strangers_globalization_is_taken() -> None:
     registry = Registry()
     registry.add(Plugin(Halfway, Backtracking), "a stranger 1.0")
-    monkeypatch.setattr(nested, "load_registry", lambda: registry)
-    solver = Newton.model_validate({"globalization": {"kind": "halfway"}})
+    with registry.in_use():
+        solver = Newton.model_validate({"globalization": {"kind": "halfway"}})
     outcome, _ = run(ToyProblem(), solver, EveryIteration(), ToyProblem.solution + 0.5, DenseLU())
     assert {row["length"] for row in outcome.rows[1:]} == {0.5}
     assert solver.model_dump() == {"kind": "newton", "globalization": {"kind": "halfway"}}

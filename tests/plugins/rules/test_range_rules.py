@@ -19,7 +19,6 @@ from pydantic import ValidationError
 import nlsolve
 from nlsolve import Status, Study
 from nlsolve.plugin import HomotopyForm, NonlinearProblem, Range, RangeRule, Recurrence, SeriesBranch
-from nlsolve.registry import nested
 from nlsolve.registry.problems import StudyError
 from nlsolve.registry.registry import Registry
 from nlsolve.solving.stopping import StoppingTest
@@ -153,11 +152,10 @@ class Halfway(HomotopyForm):
 
 
 @pytest.fixture
-def registry(monkeypatch: pytest.MonkeyPatch) -> Registry:
+def registry() -> Registry:
     """One in which the strangers are installed."""
     found = Registry.installed()
     found.add(Plugin(HalfTheWay, Halfway), "stranger 1.0")
-    monkeypatch.setattr(nested, "load_registry", lambda: found)
     return found
 
 

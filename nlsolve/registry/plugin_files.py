@@ -1,0 +1,79 @@
+"""Plugins of one file, which need no installation: a study names them, or --plugin does."""
+
+from __future__ import annotations
+
+import hashlib
+import importlib.util
+import re
+import sys
+from collections.abc import Iterable
+from pathlib import Path
+from types import ModuleType
+
+from nlsolve.contracts.component import Component
+from nlsolve.registry import hookspecs
+from nlsolve.registry.problems import StudyError
+from nlsolve.registry.registry import CONTRACTS, Registry, sentence_of
+
+DIGEST_LETTERS = 8
+
+
+def with_files(registry: Registry, paths: Iterable[Path]) -> Registry:
+    """A registry that also has the components of these files. Raises StudyError for a file that cannot be used."""
+    for path in paths:
+        file = path.resolve()
+        if file in registry.files:
+            continue
+        module = load_file(path)
+        source = f"{file.stem.replace(' ', '-')} ({path})"
+        try:
+            registry = registry.with_(_offered_by(module), source, file)
+        except Exception as error:  # a stranger's hook may raise anything
+            raise StudyError(f"the plugin {path} cannot be registered: {sentence_of(error)}") from error
+    return registry
+
+
+def load_file(path: Path) -> ModuleType:
+    """The module of a file. Its name follows from the name and the text of the file, so that a file is imported once a
+    process until it is edited, and objects of its classes can be sent to a process that has loaded the same file.
+
+    Raises StudyError for a file that cannot be imported.
+    """
+    try:
+        text = path.read_bytes()
+    except OSError as error:
+        raise StudyError(f"the plugin {path} cannot be read: {error.strerror}") from error
+    digest = hashlib.sha256(text).hexdigest()[:DIGEST_LETTERS]
+    name = f"nlsolve_file_{re.sub(r'[^0-9A-Za-z]', '_', path.stem)}_{digest}"
+    if name in sys.modules:
+        return sys.modules[name]
+    spec = importlib.util.spec_from_file_location(name, path.resolve())
+    if spec is None or spec.loader is None:
+        raise StudyError(f"the plugin {path} is no Python file: its name should end with .py")
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[name] = module
+    try:
+        spec.loader.exec_module(module)
+    except (Exception, SystemExit) as error:  # a stranger's file may raise anything
+        del sys.modules[name]
+        raise StudyError(f"the plugin {path} cannot be imported: {sentence_of(error)}") from error
+    return module
+
+
+def _offered_by(module: ModuleType) -> list[type[Component]]:
+    """What its hook returns; without a hook, every component class with a kind that the module defines.
+
+    Raises TypeError when there is none.
+    """
+    hook = getattr(module, hookspecs.nlsolve_components.__name__, None)
+    if hook is not None:
+        return list(hook())
+    contracts = tuple(CONTRACTS.values())
+    found = [
+        value
+        for value in dict.fromkeys(thing for thing in vars(module).values() if isinstance(thing, type))
+        if value.__module__ == module.__name__ and issubclass(value, contracts) and "kind" in value.model_fields
+    ]
+    if not found:
+        raise TypeError("it defines no component class with a kind")
+    return found

@@ -1,0 +1,1 @@
+"""All keys that a study may have, composed from the installed plugins."""
