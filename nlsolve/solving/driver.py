@@ -67,9 +67,8 @@ def solve(
         )
 
     if not np.isfinite(scale):
-        return ended(
-            Status.NON_FINITE, "the forces at the first state are not finite: the law gave no finite viscosity"
-        )
+        why = problem.undefined(start) or "the law gave no finite viscosity"
+        return ended(Status.NON_FINITE, f"the forces at the first state are not finite: {why}")
     if tangent.operator is not None and not solver.uses_operator:
         return ended(
             Status.NOT_APPLICABLE,
@@ -109,7 +108,9 @@ def solve(
         claimed |= step.claim is True and not solved
         denied |= step.claim is False and solved
         if not np.isfinite(residual_norm):
-            return ended(Status.OUT_OF_DOMAIN if np.isfinite(step.state).all() else Status.NON_FINITE)
+            if not np.isfinite(step.state).all():
+                return ended(Status.NON_FINITE)
+            return ended(Status.OUT_OF_DOMAIN, problem.undefined(step.state))
         if stop.met(step, residual_norm, difference):
             claimed |= not solved  # a test of differences accepts a state without its residual
             return ended(Status.CONVERGED)
