@@ -12,13 +12,15 @@ from nlsolve.contracts.outcome import Outcome
 from nlsolve.contracts.problem import NonlinearProblem
 from nlsolve.contracts.status import SolveError, Status
 from nlsolve.results.columns import step_columns
-from nlsolve.series import Array
+from nlsolve.series import Array, NoSeries
+from nlsolve.solving.counted_matrix import plain
 from nlsolve.solving.counted_problem import CountedProblem
 from nlsolve.solving.ledger import Ledger
 from nlsolve.solving.stopping import Budget, StoppingTest
 from nlsolve.solving.tangent import Tangent
 
 GROWTH_OF_DIVERGENCE = 1e6  # residual over the larger of its first value and its scale
+ROUNDING = 4.0 * float(np.finfo(float).eps)  # of ‖R‖ over the size of the terms of J u, where R counts as zero
 PATIENCE = 40  # steps without a new smallest residual after which a method has stagnated
 
 
@@ -83,6 +85,9 @@ def solve(
             with ledger.entry("method"):
                 step = next(iterator, None)
         except SolveError as error:
+            lost = error.status is Status.SINGULAR_TANGENT
+            if stop.kind != "residual" and (size == 0.0 or (lost and vanishes(problem, before, size))):
+                return ended(Status.CONVERGED, "R = 0, and the method has no further step to compare or to claim")
             denied |= residual_norm <= stop.verified
             return ended(error.status, error.detail)
         if step is None:
@@ -123,3 +128,12 @@ def solve(
         if since_best >= PATIENCE:
             return ended(Status.STAGNATED)
     return ended(Status.BUDGET_SPENT)
+
+
+def vanishes(problem: NonlinearProblem, state: Array, size: float) -> bool:
+    """Whether R(u) is no more than the rounding in terms of the size of |J| |u| that cancel; `size` is ‖R(u)‖₂."""
+    try:
+        terms = abs(plain(problem.jacobian(state))) @ np.abs(state)
+    except (SolveError, NoSeries):
+        return False
+    return bool(size <= ROUNDING * float(np.linalg.norm(terms)))
