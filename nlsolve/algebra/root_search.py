@@ -130,7 +130,8 @@ LOST = NewtonSteps(np.inf, np.inf, np.inf)
 
 def displacement(problem: NonlinearProblem, u: Array, linear: LinearSolver) -> float:
     """‖u_10 − u‖/‖u‖ for ten Newton steps from u (U,); infinite when a step fails."""
-    return newton_steps(problem, u, linear).displacement / _size(u)
+    moved = newton_steps(problem, u, linear).displacement
+    return moved / _size(u) if np.isfinite(moved) else moved
 
 
 def newton_steps(problem: NonlinearProblem, u: Array, linear: LinearSolver) -> NewtonSteps:
