@@ -6,7 +6,7 @@ from nlsolve.algebra.system import System
 from nlsolve.contracts.component import Component, InputFile
 from nlsolve.contracts.continuum.cloud import Cloud, Exact
 from nlsolve.contracts.continuum.discretizer import Discretizer, Operators, PointOperators
-from nlsolve.contracts.continuum.law import ConstitutiveLaw, PowerForm, local_index, stress
+from nlsolve.contracts.continuum.law import ConstitutiveLaw, PowerForm, local_index, stress, tangent_moduli
 from nlsolve.contracts.continuum.terms import NodeMotion, Physics, Recording, TimeSteps
 from nlsolve.contracts.linear_solver import Factors, LinearSolver
 from nlsolve.contracts.nonlinear_solver import KeptTangent, NonlinearSolver, Step
@@ -22,7 +22,7 @@ from nlsolve.contracts.status import SolveError, Status
 from nlsolve.flow.scene import FlowScene
 from nlsolve.registry.hookspecs import hookimpl
 from nlsolve.registry.nested import AnyDiscretizer, AnyForm, AnyRange, Globalized
-from nlsolve.series import NoSeries, Series, as_column
+from nlsolve.series import NoSeries, NoSeriesHere, Series, as_column
 from nlsolve.solving.anderson_mixing import Mixing
 from nlsolve.solving.matrices import cached_jacobian
 
@@ -50,6 +50,7 @@ __all__ = [
     "Misfit",
     "Mixing",
     "NoSeries",
+    "NoSeriesHere",
     "NodeMotion",
     "NonlinearProblem",
     "NonlinearSolver",
@@ -84,4 +85,5 @@ __all__ = [
     "hookimpl",
     "local_index",
     "stress",
+    "tangent_moduli",
 ]

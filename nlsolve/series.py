@@ -9,12 +9,15 @@ operations; p orders of a whole formula therefore cost O(p²). Write a formula o
     a pushed `Series`   its Taylor coefficients along a path x(a).
 
 Recurrences: Griewank & Walther, Evaluating Derivatives (2008), table 13.2. What is not analytic (absolute value,
-comparison, choice by condition) has no Taylor coefficients and raises NoSeries.
+comparison, choice by condition) has no Taylor coefficients and raises NoSeries. What is analytic, but not at the values
+it is run at, as √x at x = 0, has its value there, and raises NoSeriesHere for the first coefficient that there is not.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
+from math import ceil
 from numbers import Number
 from typing import Any, NoReturn
 from weakref import ref
@@ -23,11 +26,49 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+INFINITE, UNREAL, STEEP = "it is infinite there", "it has no real value there", "its slope is infinite there"
 FIRST_CAPACITY = 24  # coefficients packed arrays have room for at first; doubled whenever they are full
+_WAY_OUT = (
+    "write the formula with +, -, *, /, powers, the elementary functions of numpy (exp, log, sqrt, sin, atan2, sinh, "
+    "…), np.sum, np.stack and matrices from the left"
+)
 
 
 class NoSeries(TypeError):
     """A formula that has no Taylor coefficients, or is not written so that a `Series` can find them."""
+
+
+class NoSeriesHere(NoSeries):
+    """A formula that has Taylor coefficients, but not at the values it is run at.
+
+    entry : index of the first such value in the array of values.
+    """
+
+    def __init__(self, name: str, values: Array, where: Mask, why: str) -> None:
+        self.entry = tuple(int(i) for i in np.argwhere(where)[0])
+        place = f" (entry {', '.join(map(str, self.entry))})" if values.size > 1 else ""
+        super().__init__(f"{name} has no power series at x = {values[self.entry]:g}{place}: {why}")
+
+
+def _not_analytic(name: str) -> NoSeries:
+    return NoSeries(
+        f"absolute value, comparison and choice by condition (here {name}) are not analytic, so they have no Taylor "
+        f"coefficients: {_WAY_OUT}"
+    )
+
+
+def _unknown(name: str) -> NoSeries:
+    return NoSeries(f"a series has no rule for {name}: {_WAY_OUT}")
+
+
+def _refusal(name: str) -> Callable[..., NoReturn]:
+    """A method of `Series` that raises NoSeries, by the name that the reader knows it by."""
+
+    def refuse(*_: Any) -> NoReturn:
+        raise _not_analytic(name)
+
+    return refuse
 
 
 class Series:
@@ -176,6 +217,8 @@ class Series:
         if not isinstance(exponent, Number):
             self.__rpow__(self)
         power = float(exponent)  # type: ignore[arg-type]
+        if power == 0.0:  # x⁰ = 1 at x = 0 too, as for arrays
+            return _constant_series(np.ones(self.shape))
         if power.is_integer() and power >= 1.0:  # by products, which are analytic at zero too
             half = self if power < 4.0 else self ** (power // 2.0)
             if power == 1.0:
@@ -184,29 +227,31 @@ class Series:
             return square if power % 2.0 == 0.0 else _product(square, self)
         return _power(self, power)
 
-    # What has no Taylor coefficients.
+    # What has no Taylor coefficients, or none that are known here.
 
-    def _refuse(self, *_: Any) -> NoReturn:
-        raise NoSeries(
-            "absolute value, comparison and choice by condition are not analytic, so they have no Taylor coefficients: "
-            "write the formula with +, -, *, /, powers, exp, log, sqrt, sin, cos, atan2, sinh, cosh, tanh and asinh"
-        )
-
-    __abs__ = __lt__ = __le__ = __gt__ = __ge__ = __bool__ = __float__ = _refuse
-    __eq__ = __ne__ = _refuse
-    __mod__ = __rmod__ = __floordiv__ = __rfloordiv__ = _refuse
+    __abs__ = _refusal("abs")
+    __lt__ = __le__ = __gt__ = __ge__ = __eq__ = __ne__ = _refusal("a comparison")
+    __bool__ = _refusal("a choice by condition")
+    __float__ = _refusal("float")
+    __mod__ = __rmod__ = _refusal("%")
+    __floordiv__ = __rfloordiv__ = _refusal("//")
     __hash__ = object.__hash__
 
     def __array_ufunc__(self, ufunc: np.ufunc, method: str, *inputs: Any, **options: Any) -> Series:
         formula = _FORMULAS.get(ufunc)
+        if ufunc in _NOT_ANALYTIC:
+            raise _not_analytic(f"np.{ufunc.__name__}")
         if formula is None or method != "__call__" or options:
-            self._refuse()
+            how = f".{method}" if method != "__call__" else f" with {', '.join(options)}" if options else ""
+            raise _unknown(f"{ufunc.__name__}{how}")
         return formula(*inputs)
 
     def __array_function__(self, function: Callable[..., Any], types: Any, inputs: Any, options: Any) -> Series:
         formula = _ARRAY_FORMULAS.get(function)
+        if function in _NOT_ANALYTIC:
+            raise _not_analytic(f"np.{function.__name__}")
         if formula is None:
-            self._refuse()
+            raise _unknown(function.__name__)
         return formula(*inputs, **options)
 
 
@@ -252,26 +297,51 @@ def _product(x: Series, y: Series) -> Series:
 
 def _quotient(x: Series, y: Series) -> Series:
     def rule(j: int) -> Array:
+        start = y.coefficient(0)
         if j == 0:
-            return x.coefficient(0) / y.coefficient(0)
-        return (x.coefficient(j) - _convolve(y.head(j)[1:], q.head(j - 1))) / y.coefficient(0)
+            return x.coefficient(0) / start
+        if j == 1 and not start.all():
+            raise NoSeriesHere("1/x", start, start == 0.0, INFINITE)
+        return (x.coefficient(j) - _convolve(y.head(j)[1:], q.head(j - 1))) / start
 
     q = Series._by_rule(rule, x, y)
     return q
 
 
-def _power(x: Series, exponent: float) -> Series:
-    """j x₀ y_j = Σ_{l=1..j} (α l − (j − l)) x_l y_{j−l} for y = x^α."""
+def _power(x: Series, exponent: float, function: Callable[[Array], Array] | None = None, name: str = "") -> Series:
+    """j x₀ y_j = Σ_{l=1..j} (α l − (j − l)) x_l y_{j−l} for y = x^α, α no whole number ≥ 0.
+
+    At x₀ = 0 the series begins with x_m a^m, so that y = O(a^(α m)): coefficients below α m are zero, and there are no
+    further ones, because the derivative of x^α of an order above α is infinite there.
+
+    function, name : x ↦ x^α and its name, where it has one of its own.
+    """
+    name = name or f"x**{exponent:g}"
 
     def rule(j: int) -> Array:
+        start = x.coefficient(0)
         if j == 0:
-            return x.coefficient(0) ** exponent
+            return start**exponent if function is None else function(start)
         slope = x.head(j)[1:]
         weights = ((exponent + 1.0) / j * np.arange(1.0, j + 1.0) - 1.0).reshape(-1, *[1] * (slope.ndim - 1))
-        return _convolve(weights * slope, y.head(j - 1)) / x.coefficient(0)
+        sums = _convolve(weights * slope, y.head(j - 1))
+        at_zero = start == 0.0
+        if not at_zero.any():
+            if j == 1 and np.isnan(y.coefficient(0)[start < 0.0]).any():
+                raise NoSeriesHere(name, start, start < 0.0, UNREAL)
+            return sums / start
+        first = np.where(slope.any(axis=0), 1 + (slope != 0.0).argmax(axis=0), j + 1)  # m, or more than j
+        lost = at_zero & ~(exponent * first > j)
+        if lost.any():
+            raise NoSeriesHere(name, start, lost, INFINITE if exponent < 0.0 else _steep(ceil(exponent)))
+        return np.where(at_zero, 0.0, sums / np.where(at_zero, 1.0, start))
 
     y = Series._by_rule(rule, x)
     return y
+
+
+def _steep(order: int) -> str:
+    return STEEP if order == 1 else f"its derivative of order {order} is infinite there"
 
 
 def _from_slope(function: np.ufunc, x: Series, slope_of: Callable[[Series], Series]) -> Series:
@@ -294,11 +364,33 @@ def _inverse_slope(y: Series, g: Series, rest: Array, j: int) -> Array:
     return rest / g.coefficient(0)
 
 
-def _from_inverse_slope(function: np.ufunc, x: Series, g: Series) -> Series:
+@dataclass(frozen=True)
+class _Domain:
+    """low < x < high, where a function is analytic; what it is at its ends, in words."""
+
+    low: float
+    high: float
+    at_ends: str
+
+    def check(self, name: str, x: Array) -> None:
+        """Raise NoSeriesHere for an x outside; what is not a number is inside."""
+        for where, why in (
+            ((x < self.low) | (x > self.high), UNREAL),
+            ((x == self.low) | (x == self.high), self.at_ends),
+        ):
+            if where.any():
+                raise NoSeriesHere(name, x, where, why)
+
+
+def _from_inverse_slope(function: np.ufunc, x: Series, g: Series, domain: _Domain | None = None) -> Series:
     """y = f(x) through g y′ = x′."""
 
     def rule(j: int) -> Array:
-        return function(x.coefficient(0)) if j == 0 else _inverse_slope(y, g, x.coefficient(j), j)
+        if j == 0:
+            return function(x.coefficient(0))
+        if j == 1 and domain is not None:
+            domain.check(function.__name__, x.coefficient(0))
+        return _inverse_slope(y, g, x.coefficient(j), j)
 
     y = Series._by_rule(rule, x, g)
     return y
@@ -317,18 +409,63 @@ def _sine_and_cosine(x: Series, sine: np.ufunc, cosine: np.ufunc, sign: float) -
     return s, c
 
 
+def _both(x: Any, y: Any) -> tuple[Series, Series]:
+    """Two series of one shape, of which one may have been given as a constant."""
+    x, y = (part if isinstance(part, Series) else _constant_series(part) for part in (x, y))
+    if x.shape != y.shape:
+        shape = np.broadcast_shapes(x.shape, y.shape)
+        x, y = (part._linear(lambda c: np.broadcast_to(c, shape)) for part in (x, y))
+    return x, y
+
+
 def _angle(y: Any, x: Any) -> Series:
     """θ = atan2(y, x) through (x² + y²) θ′ = x y′ − y x′; as on arrays it jumps by 2π across y = 0, x < 0."""
-    y, x = (part if isinstance(part, Series) else _constant_series(part) for part in (y, x))
+    y, x = _both(y, x)
     square = x * x + y * y
 
     def rule(j: int) -> Array:
         if j == 0:
             return np.arctan2(y.coefficient(0), x.coefficient(0))
+        _away_from_origin("arctan2(y, x)", x, y, j)
         return _inverse_slope(theta, square, _derivative_convolve(y, x, j) - _derivative_convolve(x, y, j), j)
 
     theta = Series._by_rule(rule, y, x, square)
     return theta
+
+
+def _length(x: Any, y: Any) -> Series:
+    """h = √(x² + y²) through h h′ = x x′ + y y′."""
+    x, y = _both(x, y)
+
+    def rule(j: int) -> Array:
+        if j == 0:
+            return np.hypot(x.coefficient(0), y.coefficient(0))
+        _away_from_origin("hypot(x, y)", x, y, j)
+        return _inverse_slope(h, h, _derivative_convolve(x, x, j) + _derivative_convolve(y, y, j), j)
+
+    h = Series._by_rule(rule, x, y)
+    return h
+
+
+def _away_from_origin(name: str, x: Series, y: Series, j: int) -> None:
+    """Raise NoSeriesHere at order 1 where x = y = 0."""
+    start = x.coefficient(0)
+    if j == 1 and (origin := (start == 0.0) & (y.coefficient(0) == 0.0)).any():
+        raise NoSeriesHere(name, start, origin, "its slope there, where y = 0 too, depends on the direction")
+
+
+def _log_of_sum(function: np.ufunc, exponential: np.ufunc, x: Any, y: Any) -> Series:
+    """z = log(eˣ + e^y) through z′ = e^(x−z) x′ + e^(y−z) y′, or the same to the base 2: no exponential overflows."""
+    x, y = _both(x, y)
+
+    def rule(j: int) -> Array:
+        if j == 0:
+            return function(x.coefficient(0), y.coefficient(0))
+        return _derivative_convolve(x, of_x, j) + _derivative_convolve(y, of_y, j)
+
+    z = Series._by_rule(rule, x, y)
+    of_x, of_y = exponential(x - z), exponential(y - z)
+    return z
 
 
 def _joined(join: Callable[..., Array], parts: Any, axis: int = 0) -> Series:
@@ -340,9 +477,16 @@ def _joined(join: Callable[..., Array], parts: Any, axis: int = 0) -> Series:
 _ARRAY_FORMULAS: dict[Callable[..., Any], Callable[..., Series]] = {
     np.sum: lambda x, axis=None: x._linear(lambda y: np.sum(y, axis=axis)),
     np.cumsum: lambda x, axis=None: x._linear(lambda y: np.cumsum(y, axis=axis)),
+    np.mean: lambda x, axis=None: x._linear(lambda y: np.mean(y, axis=axis)),
+    np.diff: lambda x, n=1, axis=-1: x._linear(lambda y: np.diff(y, n, axis)),
+    np.roll: lambda x, shift, axis=None: x._linear(lambda y: np.roll(y, shift, axis)),
+    np.flip: lambda x, axis=None: x._linear(lambda y: np.flip(y, axis)),
     np.stack: lambda parts, axis=0: _joined(np.stack, parts, axis),
     np.concatenate: lambda parts, axis=0: _joined(np.concatenate, parts, axis),
 }
+
+_POSITIVE = _Domain(0.0, np.inf, INFINITE)
+_WITHIN_ONE = _Domain(-1.0, 1.0, STEEP)
 
 _FORMULAS: dict[np.ufunc, Callable[..., Series]] = {
     np.add: lambda x, y: x + y if isinstance(x, Series) else y + x,
@@ -350,17 +494,51 @@ _FORMULAS: dict[np.ufunc, Callable[..., Series]] = {
     np.multiply: lambda x, y: x * y if isinstance(x, Series) else y * x,
     np.divide: lambda x, y: x / y if isinstance(x, Series) else y.__rtruediv__(x),
     np.matmul: lambda matrix, x: x.__rmatmul__(matrix) if isinstance(x, Series) else matrix.__matmul__(x),
+    np.positive: lambda x: x,
     np.negative: lambda x: -x,
+    np.conjugate: lambda x: x,
+    np.reciprocal: lambda x: 1.0 / x,
     np.square: lambda x: x * x,
     np.power: lambda x, exponent: Series.__pow__(x, exponent),
-    np.sqrt: lambda x: _power(x, 0.5),
+    np.float_power: lambda x, exponent: Series.__pow__(x, exponent),
+    np.sqrt: lambda x: _power(x, 0.5, np.sqrt, "sqrt"),
+    np.cbrt: lambda x: _power(x, 1.0 / 3.0, np.cbrt, "cbrt"),
+    np.hypot: _length,
     np.exp: lambda x: _from_slope(np.exp, x, lambda y: y),
-    np.log: lambda x: _from_inverse_slope(np.log, x, x),
+    np.exp2: lambda x: _from_slope(np.exp2, x, lambda y: np.log(2.0) * y),
+    np.expm1: lambda x: _from_slope(np.expm1, x, lambda y: y + 1.0),
+    np.log: lambda x: _from_inverse_slope(np.log, x, x, _POSITIVE),
+    np.log2: lambda x: _from_inverse_slope(np.log2, x, np.log(2.0) * x, _POSITIVE),
+    np.log10: lambda x: _from_inverse_slope(np.log10, x, np.log(10.0) * x, _POSITIVE),
+    np.log1p: lambda x: _from_inverse_slope(np.log1p, x, x + 1.0, _Domain(-1.0, np.inf, INFINITE)),
+    np.logaddexp: lambda x, y: _log_of_sum(np.logaddexp, np.exp, x, y),
+    np.logaddexp2: lambda x, y: _log_of_sum(np.logaddexp2, np.exp2, x, y),
     np.sin: lambda x: _sine_and_cosine(x, np.sin, np.cos, -1.0)[0],
     np.cos: lambda x: _sine_and_cosine(x, np.sin, np.cos, -1.0)[1],
+    np.tan: lambda x: _from_slope(np.tan, x, lambda y: 1.0 + y * y),
+    np.arcsin: lambda x: _from_inverse_slope(np.arcsin, x, np.sqrt((1.0 - x) * (1.0 + x)), _WITHIN_ONE),
+    np.arccos: lambda x: _from_inverse_slope(np.arccos, x, -np.sqrt((1.0 - x) * (1.0 + x)), _WITHIN_ONE),
+    np.arctan: lambda x: _from_inverse_slope(np.arctan, x, 1.0 + x * x),
+    np.arctan2: _angle,
     np.sinh: lambda x: _sine_and_cosine(x, np.sinh, np.cosh, 1.0)[0],
     np.cosh: lambda x: _sine_and_cosine(x, np.sinh, np.cosh, 1.0)[1],
     np.tanh: lambda x: _from_slope(np.tanh, x, lambda y: 1.0 - y * y),
     np.arcsinh: lambda x: _from_inverse_slope(np.arcsinh, x, np.sqrt(1.0 + x * x)),
-    np.arctan2: _angle,
+    np.arccosh: lambda x: _from_inverse_slope(
+        np.arccosh, x, np.sqrt((x - 1.0) * (x + 1.0)), _Domain(1.0, np.inf, STEEP)
+    ),
+    np.arctanh: lambda x: _from_inverse_slope(np.arctanh, x, (1.0 - x) * (1.0 + x), _Domain(-1.0, 1.0, INFINITE)),
+    **{scale: (lambda x, scale=scale: x._linear(scale)) for scale in (np.deg2rad, np.radians, np.rad2deg, np.degrees)},
 }
+
+_NOT_ANALYTIC: frozenset[Callable[..., Any]] = frozenset(
+    (
+        *(np.absolute, np.fabs, np.sign, np.signbit, np.copysign, np.heaviside),
+        *(np.floor, np.ceil, np.trunc, np.rint, np.round, np.fix, np.remainder, np.fmod, np.floor_divide, np.divmod),
+        *(np.maximum, np.minimum, np.fmax, np.fmin, np.max, np.min, np.ptp, np.clip),
+        *(np.greater, np.greater_equal, np.less, np.less_equal, np.equal, np.not_equal),
+        *(np.logical_and, np.logical_or, np.logical_not, np.logical_xor, np.isfinite, np.isnan, np.isinf),
+        *(np.where, np.select, np.piecewise, np.sort, np.argsort, np.argmax, np.argmin, np.any, np.all),
+        *(np.median, np.quantile, np.percentile, np.nan_to_num, np.interp),
+    )
+)

@@ -335,10 +335,9 @@ REFUSED: dict[str, Callable[[Series], Any]] = {
     "max": lambda x: max(x, x),
     "np.maximum": lambda x: np.maximum(x, 0.0),
     "np.sign": np.sign,
-    "np.add with out": lambda x: np.add(x, 1.0, out=np.zeros(1)),
-    "np.add.reduce": np.add.reduce,
-    "np.prod": np.prod,
     "np.sort": np.sort,
+    "np.clip": lambda x: np.clip(x, 0.0, 1.0),
+    "np.isnan": np.isnan,
     "%": lambda x: x % 1.0,
     "//": lambda x: 1.0 // x,
 }
@@ -349,6 +348,22 @@ def test_what_has_no_taylor_coefficients_is_a_type_error_that_says_so(name: str)
     with pytest.raises(NoSeries, match="not analytic") as caught:
         REFUSED[name](line(1.0))
     assert isinstance(caught.value, TypeError)
+
+
+UNKNOWN: dict[str, Callable[[Series], Any]] = {
+    "add with out": lambda x: np.add(x, 1.0, out=np.zeros(1)),
+    "add.reduce": np.add.reduce,
+    "prod": np.prod,
+    "sinc": np.sinc,
+    "norm": np.linalg.norm,
+}
+
+
+@pytest.mark.parametrize("name", UNKNOWN)
+def test_what_no_rule_is_known_for_is_not_called_non_analytic(name: str) -> None:
+    with pytest.raises(NoSeries, match=f"a series has no rule for {name}: write the formula with") as caught:
+        UNKNOWN[name](line(1.0))
+    assert "not analytic" not in str(caught.value)
 
 
 def test_a_varying_exponent_is_a_type_error_that_names_the_way_out() -> None:

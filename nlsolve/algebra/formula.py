@@ -11,7 +11,7 @@ import scipy.sparse as sp
 from nlsolve.algebra.colouring import Colouring
 from nlsolve.contracts.problem import Expansion, NonlinearProblem
 from nlsolve.contracts.status import InputError, SolveError, Status
-from nlsolve.series import Array, Series
+from nlsolve.series import Array, NoSeriesHere, Series
 
 NUMBERS = "iuf"
 """Kinds of NumPy types that are accepted as real numbers."""
@@ -81,13 +81,17 @@ class FormulaProblem(NonlinearProblem):
             ) from error
 
     def derivative(self, u: Array, directions: Array) -> Array:
-        """J(u) S for directions S, both (U, C). Raises SolveError (not applicable) when F does not run on a series."""
+        """J(u) S for directions S, both (U, C). Raises SolveError when F does not run on a series (not applicable), or
+        has no derivative at u (non-finite).
+        """
         try:
             if self._columns:
                 base = np.broadcast_to(u[:, None], directions.shape)
                 return self._along(_seeded(base, directions)).coefficient(1)
             products = [self._along(_seeded(u, w)).coefficient(1) for w in directions.T]
             return np.stack(products, axis=1) if products else directions
+        except NoSeriesHere as error:
+            raise SolveError(Status.NON_FINITE, f"F has no derivative here: {error}") from error
         except UNFIT as error:
             raise SolveError(
                 Status.NOT_APPLICABLE,

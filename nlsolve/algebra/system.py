@@ -47,7 +47,8 @@ class System(Scene, ABC):
     @abstractmethod
     def formula(self, u: Any) -> Any:
         """F(u), (U, …) -> (U, …), analytic: of +, −, *, /, powers, indexing, slices, matrices from the left, np.stack,
-        np.concatenate, np.sum and np.cumsum along axis 0, exp, log, sin, …; constants (U,) as `as_column(values, u)`.
+        np.concatenate, np.sum and np.cumsum along axis 0, and the analytic functions of numpy (exp, log, sin, …);
+        constants (U,) as `as_column(values, u)`.
         """
 
     @abstractmethod

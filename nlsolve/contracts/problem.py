@@ -118,6 +118,10 @@ class NonlinearProblem(ABC):
             "tangent or diagonal",
         )
 
+    def undefined(self, u: Array) -> str:
+        """Why R, its derivative or its series does not exist at u, in a sentence; empty where that is not known."""
+        return ""
+
     def blame(self, u: Array, residual: Array) -> Mapping[str, float]:
         """Where R(u) = `residual` (U,) is largest, and what is special there: columns `blame_…` of a failed solve."""
         return {"blame_unknown": int(np.nan_to_num(np.abs(residual), nan=np.inf).argmax())}

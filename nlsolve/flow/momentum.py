@@ -20,7 +20,9 @@ from nlsolve.contracts.continuum.law import ConstitutiveLaw, Number, rate_square
 from nlsolve.contracts.problem import Expansion, NonlinearProblem
 from nlsolve.contracts.status import SolveError, Status
 from nlsolve.flow.motion.point_rates import PointRates
-from nlsolve.series import Array, Series
+from nlsolve.series import Array, NoSeriesHere, Series
+
+WAY_OUT = "give it a regularization ε₀ > 0, or begin from a state that is deformed everywhere (start.values)"
 
 
 @dataclass(frozen=True)
@@ -115,9 +117,12 @@ class Flow(NonlinearProblem):
         return self._balance(u)
 
     def expand(self, u: Array) -> Expansion:
-        """The expansion of R around u: the formula of the residual, run on a series that begins with u."""
+        """The expansion of R around u: the formula of the residual, run on a series that begins with u.
+
+        Its coefficients raise SolveError (non-finite) where the law has no series at a strain rate of u.
+        """
         path = Series(u)
-        return Expansion(path, self._balance(path))
+        return _Expansion(path, self._balance(path), self)
 
     def _balance(self, u: Number) -> Number:
         balance = self._constant - self._force @ stress(self.law, self.strain_rate(u)).reshape(-1)
@@ -134,9 +139,18 @@ class Flow(NonlinearProblem):
         return (self._strain @ u + self._strain_boundary).reshape(3, -1)
 
     def jacobian(self, u: Array) -> Any:
-        """J = W ρ (1/Δt + ∂(v·∇ v)/∂v) − S C B − S_θ λ B_θ with the pointwise moduli C (3, 3, M) of the law."""
+        """J = W ρ (1/Δt + ∂(v·∇ v)/∂v) − S C B − S_θ λ B_θ with the pointwise moduli C (3, 3, M) of the law.
+
+        Raises SolveError (non-finite) where the law has none at a strain rate of u.
+        """
         carried = None if self._carried is None else self._carried.tangent(u)
-        return self._linearized(tangent_moduli(self.law, self.strain_rate(u)), carried)
+        try:
+            moduli = tangent_moduli(self.law, self.strain_rate(u))
+        except NoSeriesHere as refusal:
+            raise self.without_series(u, refusal) from refusal
+        if not np.isfinite(moduli).all() and (why := self.undefined(u)):
+            raise SolveError(Status.NON_FINITE, why)
+        return self._linearized(moduli, carried)
 
     def secant(self, u: Array) -> Any:
         """A = W ρ (1/Δt + v·∇) − S 2μ B − S_θ λ B_θ, viscosity and carrying velocity those of u (Picard, Oseen)."""
@@ -200,14 +214,42 @@ class Flow(NonlinearProblem):
             terms += np.abs(self._carried.force(u))
         return float(np.linalg.norm(terms)) or 1.0
 
+    def undefined(self, u: Array) -> str:
+        """The first strain point where the viscosity is not finite, and how many there are."""
+        squared = rate_squared(self.strain_rate(u))
+        where = ~np.isfinite(self.law.viscosity(squared))
+        if not (where & np.isfinite(squared)).any():
+            return ""
+        return f"the law {self.law.kind_name()!r} has no finite viscosity at {self._spot(u, where)}; {WAY_OUT}"
+
+    def without_series(self, u: Array, refusal: NoSeriesHere) -> SolveError:
+        """The error of a law whose formula has refused to give the series, with a strain point where it does not."""
+        squared = rate_squared(self.strain_rate(u))
+        where = squared == 0.0
+        if not where.any() and refusal.entry and refusal.entry[-1] < len(squared):
+            where[refusal.entry[-1]] = True
+        spot = f" at {self._spot(u, where)}" if where.any() else ""
+        return SolveError(
+            Status.NON_FINITE,
+            f"the law {self.law.kind_name()!r} has no series{spot}: {refusal}; {WAY_OUT}, or choose a method that "
+            "needs no series, such as newton",
+        )
+
+    def _spot(self, u: Array, where: Any) -> str:
+        """The first of the strain points that are marked, its strain rate, and their number."""
+        (x, y), rate = self.operators.strain.points[where][0], np.sqrt(rate_squared(self.strain_rate(u))[where][0])
+        return f"({x:.3g}, {y:.3g}), where ε̄ = {rate:.2g} 1/s ({where.sum()} of {len(where)} strain points)"
+
     def blame(self, u: Array, residual: Array) -> Mapping[str, float]:
         """The node where ‖R‖ is largest, the strain rate at the strain point nearest to it, and the share of the strain
-        points where ε̄ < ε₀, where the regularization sets the viscosity.
+        points where ε̄ < ε₀, where the regularization sets the viscosity. Of nodes where R is not finite, the one where
+        that strain rate is least.
         """
         forces = np.nan_to_num(np.linalg.norm(residual.reshape(-1, 2), axis=1), nan=np.inf)
-        node = int(self.cloud.interior[forces.argmax()])
+        largest = self.cloud.interior[np.flatnonzero(forces == forces.max())]
         rate = np.sqrt(rate_squared(self.strain_rate(u)))
-        nearest = np.linalg.norm(self.operators.strain.points - self.cloud.nodes[node], axis=1).argmin()
+        beside = cKDTree(self.operators.strain.points).query(self.cloud.nodes[largest])[1]
+        node, nearest = min(zip(largest, beside, strict=True), key=lambda pair: float(rate[pair[1]]))
         floor = self.law.regularization_rate or 0.0
         return {
             "blame_x": float(self.cloud.nodes[node, 0]),
@@ -248,6 +290,26 @@ class Flow(NonlinearProblem):
         """p − λ tr ε̇ at the volume points, shape (L,) [MPa], the next p of an iterated penalty; None without one."""
         rate = self.dilatation_rate(u)
         return None if rate is None or self._modulus is None else self._pressure - self._modulus * rate
+
+
+class _Expansion(Expansion):
+    """The expansion of a flow, whose law may have no series at a strain rate."""
+
+    def __init__(self, path: Series, residual: Series, flow: Flow) -> None:
+        super().__init__(path, residual)
+        self._flow = flow
+
+    def coefficient(self, j: int) -> Array:
+        try:
+            return super().coefficient(j)
+        except NoSeriesHere as refusal:
+            raise self._flow.without_series(self._path.coefficient(0), refusal) from refusal
+
+    def remainder(self, j: int) -> Array:
+        try:
+            return super().remainder(j)
+        except NoSeriesHere as refusal:
+            raise self._flow.without_series(self._path.coefficient(0), refusal) from refusal
 
 
 class _Carried:

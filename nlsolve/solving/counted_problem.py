@@ -10,10 +10,19 @@ import numpy as np
 
 from nlsolve.contracts.problem import Expansion, NonlinearProblem
 from nlsolve.contracts.status import SolveError, Status
-from nlsolve.series import Array, NoSeries
+from nlsolve.series import Array, NoSeries, NoSeriesHere
 from nlsolve.solving.counted_matrix import CountedMatrix, counted
 from nlsolve.solving.ledger import Ledger
 from nlsolve.solving.matrices import CheckedOperator
+
+
+@contextmanager
+def refused_here() -> Iterator[None]:
+    """Turn NoSeriesHere, which a formula raises at some states, into SolveError (non-finite)."""
+    try:
+        yield
+    except NoSeriesHere as refusal:
+        raise SolveError(Status.NON_FINITE, str(refusal)) from refusal
 
 
 class CountedExpansion(Expansion):
@@ -26,7 +35,7 @@ class CountedExpansion(Expansion):
     def coefficient(self, j: int) -> Array:
         """R_j, (U,). Unknown orders up to j are computed and counted; a known order costs nothing."""
         while self._known <= j:
-            with self._ledger.entry("series_order"):
+            with self._ledger.entry("series_order"), refused_here():
                 self._expansion.coefficient(self._known)
             self._ledger.counts["series_term"] += self._known
             self._known += 1
@@ -35,7 +44,7 @@ class CountedExpansion(Expansion):
     def remainder(self, j: int) -> Array:
         """Q_j, (U,), counted as one order. R_j is not known from it and counts when it is asked for."""
         self.coefficient(j - 1)
-        with self._ledger.entry("series_order"):
+        with self._ledger.entry("series_order"), refused_here():
             return self._expansion.remainder(j)
 
     def append(self, coefficient: Array) -> None:
@@ -118,14 +127,21 @@ class CountedProblem(NonlinearProblem):
 
     @contextmanager
     def _not_applicable_without_series(self, way_out: str) -> Iterator[None]:
-        """Turn NoSeries, which a formula raises, into SolveError (not applicable)."""
+        """Turn NoSeries, which a formula raises, into SolveError (not applicable; non-finite where it is a matter of
+        the state).
+        """
         try:
-            yield
+            with refused_here():
+                yield
         except NoSeries as refusal:
             name = type(self._problem).__name__
             raise SolveError(
                 Status.NOT_APPLICABLE, f"the formula of {name} has no Taylor series: {refusal}; or {way_out}"
             ) from refusal
+
+    def undefined(self, u: Array) -> str:
+        """See `NonlinearProblem`; not counted."""
+        return self._problem.undefined(u)
 
     def blame(self, u: Array, residual: Array) -> Mapping[str, float]:
         """See `NonlinearProblem`; not counted."""

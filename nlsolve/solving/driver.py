@@ -12,13 +12,15 @@ from nlsolve.contracts.outcome import Outcome
 from nlsolve.contracts.problem import NonlinearProblem
 from nlsolve.contracts.status import CaseStopped, SolveError, Status
 from nlsolve.results.columns import step_columns
-from nlsolve.series import Array
+from nlsolve.series import Array, NoSeries
+from nlsolve.solving.counted_matrix import plain
 from nlsolve.solving.counted_problem import CountedProblem
 from nlsolve.solving.ledger import Ledger
 from nlsolve.solving.stopping import Budget, StoppingTest
 from nlsolve.solving.tangent import Tangent
 
 GROWTH_OF_DIVERGENCE = 1e6  # residual over the larger of its first value and its scale
+ROUNDING = 4.0 * float(np.finfo(float).eps)  # of ‖R‖ over the size of the terms of J u, where R counts as zero
 PATIENCE = 40  # steps without a new smallest residual after which a method has stagnated
 
 
@@ -68,9 +70,8 @@ def solve(
         )
 
     if not np.isfinite(scale):
-        return ended(
-            Status.NON_FINITE, "the forces at the first state are not finite: the law gave no finite viscosity"
-        )
+        why = problem.undefined(start) or "the law gave no finite viscosity"
+        return ended(Status.NON_FINITE, f"the forces at the first state are not finite: {why}")
     if tangent.operator is not None and not solver.uses_operator:
         return ended(
             Status.NOT_APPLICABLE,
@@ -85,6 +86,9 @@ def solve(
             with ledger.entry("method"):
                 step = next(iterator, None)
         except SolveError as error:
+            lost = error.status is Status.SINGULAR_TANGENT
+            if stop.kind != "residual" and (size == 0.0 or (lost and vanishes(problem, before, size))):
+                return ended(Status.CONVERGED, "R = 0, and the method has no further step to compare or to claim")
             denied |= residual_norm <= stop.verified
             return ended(error.status, error.detail)
         except CaseStopped as limit:
@@ -112,7 +116,9 @@ def solve(
         claimed |= step.claim is True and not solved
         denied |= step.claim is False and solved
         if not np.isfinite(residual_norm):
-            return ended(Status.OUT_OF_DOMAIN if np.isfinite(step.state).all() else Status.NON_FINITE)
+            if not np.isfinite(step.state).all():
+                return ended(Status.NON_FINITE)
+            return ended(Status.OUT_OF_DOMAIN, problem.undefined(step.state))
         if stop.met(step, residual_norm, difference):
             claimed |= not solved  # a test of differences accepts a state without its residual
             return ended(Status.CONVERGED)
@@ -125,3 +131,12 @@ def solve(
         if since_best >= PATIENCE:
             return ended(Status.STAGNATED)
     return ended(Status.BUDGET_SPENT)
+
+
+def vanishes(problem: NonlinearProblem, state: Array, size: float) -> bool:
+    """Whether R(u) is no more than the rounding in terms of the size of |J| |u| that cancel; `size` is ‖R(u)‖₂."""
+    try:
+        terms = abs(plain(problem.jacobian(state))) @ np.abs(state)
+    except (SolveError, NoSeries):
+        return False
+    return bool(size <= ROUNDING * float(np.linalg.norm(terms)))

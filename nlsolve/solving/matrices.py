@@ -6,11 +6,36 @@ from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
+from numpy.typing import NDArray
 
 from nlsolve.contracts.problem import NonlinearProblem
 from nlsolve.contracts.rules.operator import IterationOperator
 from nlsolve.contracts.status import SolveError, Status
 from nlsolve.series import Array
+
+RANKED = 300  # unknowns up to which the rank of a matrix is counted
+
+
+def why_singular(matrix: Any) -> str:
+    """Why a sparse (U, U) matrix, taken for J, is singular: by its first column or row of zeros, or by its rank."""
+    sizes = abs(sp.csr_array(matrix))
+    columns, rows = (np.flatnonzero(sizes.max(axis=axis).toarray() == 0.0) for axis in (0, 1))
+    size = matrix.shape[0]
+    if len(columns) == size:
+        return "J = 0, so that R does not change with any unknown to first order"
+    if len(columns):
+        return f"R does not change with u[{columns[0]}]{_and_others(columns)} to first order"
+    if len(rows):
+        return f"R[{rows[0]}]{_and_others(rows)} does not change with any unknown to first order"
+    if size <= RANKED:
+        rank = int(np.linalg.matrix_rank(matrix.toarray()))
+        if rank < size:
+            return f"the rank of J is {rank} of {size}, so that some equations repeat others to first order"
+    return "some equations repeat others to first order, to working precision"
+
+
+def _and_others(found: NDArray[np.intp]) -> str:
+    return f" and {len(found) - 1} more" if len(found) > 1 else ""
 
 
 class CheckedOperator:

@@ -15,9 +15,10 @@ from nlsolve.contracts.status import SolveError, Status
 from nlsolve.series import Array
 from nlsolve.solving.counted_matrix import CountedMatrix, counted, plain
 from nlsolve.solving.ledger import Ledger
-from nlsolve.solving.matrices import CheckedOperator
+from nlsolve.solving.matrices import CheckedOperator, why_singular
 
 SMALLEST = 1e-16  # a smaller contraction is rounding, and counts as this one
+WAY_OUT = "choose the solver robust, which gets away from such a state, or another start"
 RECENT = 10.0  # solves after which an earlier rate weighs 1/e
 
 
@@ -67,7 +68,10 @@ class Tangent(KeptTangent):
             with self._ledger.entry("factorization"):
                 factors = self._linear.factorize(plain(matrix), self.factors or self._pattern)
         except SolveError as error:
-            raise self._blamed(error.status, error.detail) from error
+            why = error.detail
+            if error.status is Status.SINGULAR_TANGENT and self.operator is None:
+                why = f"{why_singular(plain(matrix))} ({why}); {WAY_OUT}"
+            raise self._blamed(error.status, why) from error
         self._ledger.counts["factorization"] += factors.attempts - 1
         return factors
 
@@ -89,7 +93,10 @@ class Tangent(KeptTangent):
             x = x + self._solved(self.factors, rhs - self._matrix @ x)
         self.history = replace(self.history, solves=self.history.solves + 1)
         if not np.isfinite(x).all():
-            raise self._blamed(Status.SINGULAR_TANGENT, "a solve with the tangent gave no finite answer")
+            why = "a solve with the tangent gave no finite answer"
+            if self.operator is None:
+                why = f"{why}: {why_singular(plain(self._matrix))}; {WAY_OUT}"
+            raise self._blamed(Status.SINGULAR_TANGENT, why)
         return x
 
     def _blamed(self, status: Status, why: str) -> SolveError:

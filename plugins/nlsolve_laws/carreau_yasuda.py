@@ -17,7 +17,7 @@ class CarreauYasuda(ConstitutiveLaw):
     """
 
     kind: Literal["carreau-yasuda"] = "carreau-yasuda"
-    continued_by: ClassVar = {"index": "larger", "regularization": "larger"}
+    continued_by: ClassVar = {"index": "nearer 1", "regularization": "larger"}
     rest_viscosity: float = Field(50.0, gt=0, description="μ₀, at rest [MPa s]")
     fast_viscosity: float = Field(0.0, ge=0, description="μ∞, at ε̄ → ∞ [MPa s]")
     time: float = Field(1.0, gt=0, description="λ, one over the rate ε̄ at which thinning sets in [s]")

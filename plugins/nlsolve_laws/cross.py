@@ -13,7 +13,7 @@ class Cross(ConstitutiveLaw):
     """μ(ε̄²) = μ∞ + (μ₀ − μ∞) / (1 + (λ² (ε̄² + ε₀²))^((1−n)/2))  [MPa s].
 
     Cross (1965), in ε̄, not γ̇. Far above 1/λ it is μ∞ plus a power law of index n. The power of ε̄² is not analytic at
-    rest, so that series and tangents need ε₀ > 0 there.
+    rest, so that series need ε₀ > 0 there; tangents do not.
     """
 
     kind: Literal["cross"] = "cross"

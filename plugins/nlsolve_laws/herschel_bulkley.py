@@ -41,7 +41,7 @@ class HerschelBulkley(_Yielding):
     """
 
     kind: Literal["herschel-bulkley"] = "herschel-bulkley"
-    continued_by: ClassVar = {"index": "larger", **_Yielding.continued_by}
+    continued_by: ClassVar = {"index": "nearer 1", **_Yielding.continued_by}
     consistency: float = Field(40.0, gt=0, description="K [MPa sⁿ]")
     index: float = Field(0.3, gt=0, description="n")
 

@@ -17,7 +17,7 @@ class NortonHoff(ConstitutiveLaw):
     """
 
     kind: Literal["norton-hoff"] = "norton-hoff"
-    continued_by: ClassVar = {"index": "larger", "regularization": "larger"}
+    continued_by: ClassVar = {"index": "nearer 1", "regularization": "larger"}
     consistency: float = Field(40.0, gt=0, description="K [MPa s^m]")
     index: float = Field(0.2, gt=0, description="m, sensitivity to the strain rate")
     regularization: float = Field(1e-2, ge=0, description="ε₀ [1/s]")

@@ -17,7 +17,7 @@ class PowerLaw(ConstitutiveLaw):
     """
 
     kind: Literal["power-law"] = "power-law"
-    continued_by: ClassVar = {"index": "larger", "regularization": "larger"}
+    continued_by: ClassVar = {"index": "nearer 1", "regularization": "larger"}
     consistency: float = Field(2.69e10, gt=0, description="k [MPa sⁿ K^−A]")
     temperature_exponent: float = Field(-3.3155, description="A")
     temperature: float = Field(300.0, gt=0, description="T [K]")

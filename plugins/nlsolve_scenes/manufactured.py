@@ -7,7 +7,18 @@ from typing import Literal, Self
 import numpy as np
 from pydantic import Field, model_validator
 
-from nlsolve.plugin import Cloud, ConstitutiveLaw, Exact, Physics, Series, SolveError, Status, stress
+from nlsolve.plugin import (
+    Cloud,
+    ConstitutiveLaw,
+    Exact,
+    NoSeriesHere,
+    Physics,
+    Series,
+    SolveError,
+    Status,
+    stress,
+    tangent_moduli,
+)
 from nlsolve_scenes.formulas import Formula, Jet
 from nlsolve_scenes.nodes.rectangle import Rectangle, grid
 
@@ -36,15 +47,7 @@ class Manufactured(Rectangle):
     def _a_smooth_field_without_divergence(self) -> Self:
         points = self._samples
         with np.errstate(all="ignore"):
-            jets = {name: Jet.of(getattr(self, name), points) for name in ("u", "v", "p")}
-        for name, jet in jets.items():
-            bad = np.flatnonzero(~np.isfinite([jet.f, jet.x, jet.y, jet.xx, jet.xy, jet.yy]).all(axis=0))
-            if len(bad):
-                x, y = points[bad[0]]
-                raise ValueError(
-                    f"{name} = {getattr(self, name)!r} or a derivative of it is not finite at ({x:.6g}, {y:.6g}): "
-                    "change it, or the rectangle"
-                )
+            jets = {name: self._jet(name, points) for name in ("u", "v", "p")}
         u, v = jets["u"], jets["v"]
         largest = float(np.abs([u.x, u.y, v.x, v.y]).max())
         dilatation = np.abs(u.x + v.y)
@@ -58,6 +61,21 @@ class Manufactured(Rectangle):
         if not np.abs(_strain_rate(u, v)).max() > ROUNDING * largest:
             raise ValueError(f"u = {self.u!r} and v = {self.v!r} are a rigid motion: nothing is strained")
         return self
+
+    def _jet(self, name: str, points: np.ndarray) -> Jet:
+        """The jet of a field at points (N, 2). Raises ValueError where a part of it is not finite."""
+        try:
+            jet = Jet.of(getattr(self, name), points)
+            bad = np.flatnonzero(~np.isfinite([jet.f, jet.x, jet.y, jet.xx, jet.xy, jet.yy]).all(axis=0))
+        except NoSeriesHere as refusal:
+            bad = np.array(refusal.entry)
+        if len(bad):
+            x, y = points[bad[0]]
+            raise ValueError(
+                f"{name} = {getattr(self, name)!r} or a derivative of it is not finite at ({x:.6g}, {y:.6g}): "
+                "change it, or the rectangle"
+            )
+        return jet
 
     @property
     def corners(self) -> tuple[tuple[float, float], tuple[float, float]]:
@@ -118,7 +136,12 @@ def _strain_rate(u: Jet, v: Jet) -> np.ndarray:
 
 
 def _slope_of_stress(law: ConstitutiveLaw, rate: np.ndarray, slope: np.ndarray) -> np.ndarray:
-    """∂S along a direction in which ε̇ (3, N) has the given slope: coefficient 1 of S(ε̇ + a ∂ε̇)."""
+    """∂S along a direction in which ε̇ (3, N) has the given slope: coefficient 1 of S(ε̇ + a ∂ε̇), or C ∂ε̇ for a law
+    that has a tangent at rest, and no series.
+    """
     path = Series(rate)
     path.append(slope)
-    return stress(law, path).coefficient(1)
+    try:
+        return stress(law, path).coefficient(1)
+    except NoSeriesHere:
+        return np.einsum("ijm,jm->im", tangent_moduli(law, rate), slope)

@@ -14,6 +14,8 @@ from nlsolve.plugin import KeptTangent, NonlinearProblem, NonlinearSolver, Solve
 
 ACCEPTED = 1e-4  # gain over the one predicted from which a step is taken
 LARGEST_SHIFT = 1e12  # μ: shorter steps are lost in the rounding of u
+STATIONARY = 1e-8  # ‖Jᵀ R‖ over ‖J‖ ‖R‖, of Frobenius
+WAY_OUT = "where no step of this method leads on: begin elsewhere, or choose robust"
 
 
 class LevenbergMarquardt(NonlinearSolver):
@@ -40,6 +42,8 @@ class LevenbergMarquardt(NonlinearSolver):
             renewed = tangent.refresh_if_due(lambda: augmented(problem.jacobian(state), shift))
             if refused and (shift > LARGEST_SHIFT or not renewed):
                 why = f"with a damping of {shift:.1e}" if renewed else "and the refresh rule keeps its matrix"
+                if is_stationary(problem.jacobian(state), residual):
+                    why += f"; Jᵀ R = 0 here: the least or another stationary point of ‖R‖, {WAY_OUT}"
                 raise SolveError(Status.STAGNATED, f"a step was refused because ‖R‖ does not fall, {why}")
             both = tangent.solve(np.concatenate([-residual, np.zeros_like(state)]))
             left, step = np.split(both, 2)
@@ -61,10 +65,19 @@ def augmented(jacobian: Any, shift: float) -> Any:
     """(I, J; Jᵀ/α, −μ D/α) of shape (2 U, 2 U) with D = diag(‖J e_j‖²), α = min_j ‖J e_j‖.
 
     (I, J; Jᵀ/α, −μ D/α) (r; w) = (b; 0) has w = argmin ‖b − J w‖² + μ ‖D^½ w‖² and r = b − J w: the normal equations
-    without JᵀJ, whose condition is the square of J's (Björck 1996, 1.6). α makes rows of one size.
+    without JᵀJ, whose condition is the square of J's (Björck 1996, 1.6). α makes rows of one size. For a column of
+    zeros, by which w cannot be told, ‖J e_j‖ is the largest there is, or 1: its w_j is zero.
     """
     matrix = jacobian.tocsr()
     columns = norm(matrix, axis=0)
-    alpha = float(columns.min()) or 1.0
+    columns = np.where(columns > 0.0, columns, columns.max() or 1.0)
+    alpha = float(columns.min())
     rows = [[sp.eye_array(matrix.shape[0]), matrix], [matrix.T / alpha, -sp.diags_array(shift * columns**2 / alpha)]]
     return sp.block_array(rows, format="csr")
+
+
+def is_stationary(jacobian: Any, residual: np.ndarray) -> bool:
+    """Whether the gradient Jᵀ R of ½ ‖R‖² vanishes beside ‖J‖ ‖R‖."""
+    matrix = jacobian.tocsr()
+    gradient = float(np.linalg.norm(matrix.T @ residual))
+    return gradient <= STATIONARY * float(norm(matrix)) * float(np.linalg.norm(residual))

@@ -24,16 +24,23 @@ class PseudoTransient(NonlinearSolver):
 
     def steps(self, problem: NonlinearProblem, tangent: KeptTangent, start: np.ndarray) -> Iterator[Step]:
         """The iterates u_0, u_1, …"""
+        for step, _ in self.steps_and_residuals(problem, tangent, start):
+            yield step
+
+    def steps_and_residuals(
+        self, problem: NonlinearProblem, tangent: KeptTangent, start: np.ndarray
+    ) -> Iterator[tuple[Step, np.ndarray]]:
+        """The iterates with R(u_0), R(u_1), …, for a method that needs both."""
         state, shift = start, self.shift
         residual = problem.residual(state)
-        yield Step(state)
+        yield Step(state), residual
         while True:
             size = float(np.linalg.norm(residual))
             tangent.refresh_if_due(lambda: damped(problem.jacobian(state), shift))
             state = state - tangent.solve(residual)
             residual = problem.residual(state)
             shift *= float(np.linalg.norm(residual)) / size if size else 0.0
-            yield Step(state)
+            yield Step(state), residual
 
 
 def damped(jacobian: Any, shift: float) -> Any:

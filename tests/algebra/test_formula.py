@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 
+import nlsolve
 from nlsolve.algebra.formula import FormulaProblem
 from nlsolve.contracts.status import InputError, SolveError, Status
 from nlsolve.testing import check_problem
@@ -139,3 +140,31 @@ def test_what_is_no_jacobian(returned, sentence):
 def test_integers_are_numbers():
     residual = FormulaProblem(lambda u: [1, 2], 2).residual(np.ones(2))
     assert residual.dtype == np.float64
+
+
+def square_roots(u: Any) -> Any:
+    return np.sqrt(u) + u - 3.0
+
+
+@pytest.mark.parametrize("columns", [True, False])
+def test_a_formula_without_a_derivative_at_a_state_says_where_and_why(columns: bool) -> None:
+    problem = FormulaProblem(square_roots, 2, columns=columns)
+    with pytest.raises(
+        SolveError, match=r"F has no derivative here: sqrt has no power series at x = 0 \(entry 1"
+    ) as refusal:
+        problem.jacobian(np.array([1.0, 0.0]))
+    assert refusal.value.status is Status.NON_FINITE
+    check_problem(problem, np.array([1.0, 0.5]))
+
+
+@pytest.mark.parametrize("solver", ["newton", "anm", "newton-krylov", "trust-region"])
+def test_a_method_that_meets_such_a_state_ends_with_that_sentence(solver: str) -> None:
+    outcome = nlsolve.solve(square_roots, np.array([1.0, 0.0]), solver=solver)
+    assert outcome.status is Status.NON_FINITE
+    assert "sqrt has no power series at x = 0 (entry 1" in outcome.detail
+    assert "its slope is infinite there" in outcome.detail
+
+
+def test_the_derivative_of_a_power_above_one_at_zero_is_zero() -> None:
+    outcome = nlsolve.solve(lambda u: u**1.5 + u - 2.0, np.zeros(3), solver="newton")
+    np.testing.assert_allclose(outcome.state, 1.0)

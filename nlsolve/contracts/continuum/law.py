@@ -14,7 +14,7 @@ from typing import Any, ClassVar, Literal, TypeVar
 import numpy as np
 
 from nlsolve.contracts.component import Component
-from nlsolve.series import Array, Series
+from nlsolve.series import Array, NoSeriesHere, Series
 
 Number = TypeVar("Number", Array, Series)
 
@@ -33,11 +33,13 @@ class PowerForm:
 
 
 class ConstitutiveLaw(Component, ABC):
-    """A viscous law S = 2 μ(ε̄²) ε̇, analytic for ε̄² ≥ 0."""
+    """A viscous law S = 2 μ(ε̄²) ε̇, analytic for ε̄² > 0. At rest it may be infinite, or finite without a series."""
 
     noun: ClassVar[str] = "law"
-    continued_by: ClassVar[Mapping[str, Literal["larger", "smaller"]]] = {}
-    """The fields by which the law is continued, and whether larger or smaller values of them are easier to solve."""
+    continued_by: ClassVar[Mapping[str, Literal["larger", "smaller", "nearer 1"]]] = {}
+    """The fields by which the law is continued, and whether larger or smaller values of them are easier to solve, or,
+    as for an index, those nearer 1: below 1 larger ones, above 1 smaller ones down to 1.
+    """
 
     @abstractmethod
     def viscosity(self, rate_squared: Number) -> Number:
@@ -63,19 +65,31 @@ class ConstitutiveLaw(Component, ABC):
             fields = f"{', '.join(self.continued_by)} only" if self.continued_by else "none of its fields"
             raise ValueError(f"start.by = {by!r}: the law {self.kind_name()!r} is continued by {fields}")
         target = getattr(self, by)
-        larger = self.continued_by[by] == "larger"
-        easier = [value for value in values if (value > target if larger else value < target)]
+        way = self.continued_by[by]
+        larger = way == "larger" or (way == "nearer 1" and target <= 1.0)
+        least = 1.0 if way == "nearer 1" else -np.inf
+        easier = [value for value in values if (value > target if larger else least <= value < target)]
         return [self.with_(**{by: value}) for value in easier] + [self]
 
 
 def tangent_moduli(law: ConstitutiveLaw, strain_rate: Array) -> Any:
     """C = ∂S/∂ε̇ = 2 μ I + (8/3) μ′(ε̄²) ε̇ ⊗ (w ε̇): shape (3, 3, M) for strain rates (3, M) ordered xx, yy, xy.
 
-    w = (1, 1, 2) because ε̇:ε̇ = ε̇xx² + ε̇yy² + 2 ε̇xy². The derivative μ′ is the formula run on a seeded series.
+    w = (1, 1, 2) because ε̇:ε̇ = ε̇xx² + ε̇yy² + 2 ε̇xy². The derivative μ′ is the formula run on a seeded series. Where
+    ε̇ = 0 the second term vanishes whether or not μ′ is finite there: ε̄² μ′(ε̄²) → 0 if μ(0) is finite.
     """
-    viscosity = law.viscosity(Series.seed(rate_squared(strain_rate)))
+    squared = rate_squared(strain_rate)
+    at_rest = squared == 0.0
+    viscosity = law.viscosity(Series.seed(squared))
+    try:
+        slope = viscosity.coefficient(1)
+    except NoSeriesHere:
+        if not at_rest.any():
+            raise
+        slope = law.viscosity(Series.seed(np.where(at_rest, 1.0, squared))).coefficient(1)
+    slope = np.where(at_rest, 0.0, slope)
     weighted = CONTRACTION[:, None] * strain_rate
-    moduli = (8.0 / 3.0) * viscosity.coefficient(1) * strain_rate[:, None, :] * weighted[None, :, :]
+    moduli = (8.0 / 3.0) * slope * strain_rate[:, None, :] * weighted[None, :, :]
     moduli[np.arange(3), np.arange(3)] += 2.0 * viscosity.coefficient(0)
     return moduli
 
