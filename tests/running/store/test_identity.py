@@ -79,8 +79,7 @@ def test_a_case_keeps_its_name_whatever_is_asked_shown_or_swept_besides(tmp_path
 
 def test_the_code_of_a_case_is_that_of_its_classes(tmp_path):
     identity = identity_of(study_of(tmp_path).cases[0])
-    of_the_default_start = {"nlsolve_solvers", "nlsolve_rules"}
-    assert set(identity.code) == {"fakes", "nlsolve"} | of_the_default_start
+    assert set(identity.code) == {"fakes", "nlsolve"}
     assert identity.code["nlsolve"] == numerics()
     assert identity.files == {}
     assert all(set(sources_of(cls)) == {"fakes", "nlsolve"} for cls in COMPONENTS)

@@ -25,6 +25,7 @@ from nlsolve.study.study import Study
 @pytest.fixture(autouse=True)
 def fake(monkeypatch, tmp_path):
     monkeypatch.setattr("nlsolve.study.study.load_registry", registry_of)
+    monkeypatch.setattr("nlsolve.cli.options.load_registry", registry_of)
     monkeypatch.setattr("nlsolve.running.engines.execution.run_case", fake_march)
     monkeypatch.chdir(tmp_path)
 
