@@ -231,8 +231,8 @@ def test_many_rows_are_lines_without_rules(tmp_path):
     orders = ("[10, 20]", str(list(range(2, 303))))
     lines = nlsolve("plan", write_study(tmp_path, orders)).stdout.splitlines()
     assert lines[0] == "602 cases"
-    assert lines[1].split()[:3] == ["case", "solver.order", "solver.tolerance"]
-    assert [line.split()[1:3] for line in lines[2:4]] == [["2", "1e-06"], ["2", "1e-08"]]
+    assert lines[1].split()[:4] == ["case", "plan", "solver.order", "solver.tolerance"]
+    assert [line.split()[1:4] for line in lines[2:4]] == [["new", "2", "1e-06"], ["new", "2", "1e-08"]]
     assert "━" not in "".join(lines)
     tall = (
         ('columns = "solver.tolerance"\n', ""),

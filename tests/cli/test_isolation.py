@@ -74,6 +74,7 @@ def test_a_crash_and_a_hang_cost_their_own_cases(tmp_path):
 )
 def test_wishes_that_cannot_be_met_are_2(tmp_path, monkeypatch, arguments, sentence):
     monkeypatch.setattr("nlsolve.study.study.load_registry", registry_of)
+    monkeypatch.setattr("nlsolve.cli.options.load_registry", registry_of)
     monkeypatch.chdir(tmp_path)
     result = CliRunner().invoke(app, ["run", str(write_study(tmp_path)), *arguments])
     assert result.exit_code == 2
@@ -83,6 +84,7 @@ def test_wishes_that_cannot_be_met_are_2(tmp_path, monkeypatch, arguments, sente
 
 def test_pdb_is_called_where_the_error_is_raised(tmp_path, monkeypatch):
     monkeypatch.setattr("nlsolve.study.study.load_registry", registry_of)
+    monkeypatch.setattr("nlsolve.cli.options.load_registry", registry_of)
     monkeypatch.chdir(tmp_path)
     debugged = []
     monkeypatch.setattr("nlsolve.cli.progress.pdb.post_mortem", debugged.append)
