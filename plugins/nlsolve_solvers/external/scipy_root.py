@@ -1,4 +1,4 @@
-"""F(y) = R(u + K*⁻¹ y) = 0 : `scipy.optimize.root` on the residual preconditioned on the right."""
+"""R(u) = 0, or F(y) = R(u + K*⁻¹ y) = 0 : `scipy.optimize.root`, called directly or preconditioned on the right."""
 
 from __future__ import annotations
 
@@ -16,26 +16,32 @@ MATRIX_IS_ONE = -1.0  # `alpha`: SciPy's methods begin with the Jacobian −1/α
 
 
 class ScipyRoot(NonlinearSolver):
-    """y begins at 0; the residual is the true one, and each value of F costs one solve and one residual. Without
-    `precondition` F = R, as for a caller of SciPy without a matrix. hybr needs a dense Jacobian, which it
-    makes of U differences of F, or is given: U products with J, and as many solves.
+    """Without `precondition` SciPy is called as anyone calls it: `root(R, start, method=…)`, once. Its iterates, counts
+    and claims are those of a direct call with the same options. Where it ends is one step; if the stopping test is not
+    met there the method has stagnated, and SciPy's own message says why.
 
-    `root` does not hand over its iterates as they come, so one run of it is one step: until ‖F‖₂ ≤ `tolerance` · scale
-    and a tenth of its first value (hybr: until y changes by less than `tolerance`), or until `iterations` are used up.
-    Then the refresh rule is told the contraction per value of F and is asked, and the next run begins here.
+    With `precondition` the unknown is y, which begins at 0; the residual is the true one, and each value of F costs one
+    solve and one residual. One run of `root` is one step: until ‖F‖₂ ≤ `tolerance` · scale and a tenth of its first
+    value (hybr: until y changes by less than `tolerance`), or until `iterations` are used up. Then the refresh rule is
+    told the contraction per value of F and is asked, and the next run begins here.
+
+    hybr needs a dense Jacobian, which it makes of U differences of F, or is given: U products with J, and as many
+    solves.
     """
 
     kind: Literal["scipy-root"] = "scipy-root"
     method: Literal["hybr", "krylov", "broyden1", "anderson", "df-sane"] = Field("krylov", description="as in SciPy")
-    tolerance: float = Field(1e-8, gt=0, description="relative residual at which one run ends")
-    iterations: int = Field(50, gt=0, description="of SciPy's method in one run, before K* may be renewed")
+    tolerance: float = Field(1e-8, gt=0, description="relative residual at which one run ends; xtol of hybr")
+    iterations: int = Field(50, gt=0, description="of SciPy's method in one run; not of hybr")
     precondition: bool = Field(True, description="right preconditioning by K*")
     jacobian: Literal["differences", "products"] = Field("differences", description="how hybr comes by its matrix")
     default_refresh: ClassVar = {"kind": "poor-contraction"}
     uses_operator: ClassVar[bool] = True
 
     def steps(self, problem: NonlinearProblem, tangent: KeptTangent, start: np.ndarray) -> Iterator[Step]:
-        """The start, and the ends of the runs. Raises SolveError (stagnated) if a step or pivot of SciPy vanishes."""
+        """The start, and the ends of the runs. Raises SolveError (stagnated) if a step or pivot of SciPy vanishes, or,
+        without preconditioning, where SciPy has ended.
+        """
         state, known = start, [problem.residual(start)]
         size = float(np.linalg.norm(known[0]))
         goal = self.tolerance * problem.scale(start)
@@ -45,11 +51,17 @@ class ScipyRoot(NonlinearSolver):
                 "without preconditioning there is no K*: set precondition = true, or leave `operator` at its default",
             )
         yield Step(state)
+        if not self.precondition:
+            found, values = self._run(problem, None, state, known, goal)
+            contraction = (float(np.linalg.norm(found.fun)) / size) ** (1.0 / values) if size else 0.0
+            yield Step(found.x, bool(found.success), {"contraction": contraction, **reported(found)})
+            word = "reports success; lower its `tolerance`, or ask for less" if found.success else "ends here"
+            said = " ".join(found.message.split()).rstrip(".")
+            raise SolveError(Status.STAGNATED, f"scipy.optimize.root, {self.method}, {word}: {said}")
         while True:
-            if self.precondition:
-                tangent.refresh_if_due(lambda: problem.operator(state))
+            tangent.refresh_if_due(lambda: problem.operator(state))
             found, values = self._run(problem, tangent, state, known, min(goal, LEAST_GAIN * size))
-            state = state + (tangent.solve(found.x) if self.precondition else found.x)
+            state = state + tangent.solve(found.x)
             to_the_end = self.method == "hybr" or goal <= LEAST_GAIN * size
             before, size = size, float(np.linalg.norm(found.fun))
             contraction = (size / before) ** (1.0 / values) if before else 0.0
@@ -60,18 +72,20 @@ class ScipyRoot(NonlinearSolver):
     def _run(
         self,
         problem: NonlinearProblem,
-        tangent: KeptTangent,
+        tangent: KeptTangent | None,
         state: np.ndarray,
         known: list[np.ndarray],
         goal: float,
     ) -> tuple[Any, int]:
-        """What one run of SciPy's method from y = 0 found, and how many values of F it took. SciPy asks for F(0) first:
-        a value that is `known` is handed over and forgotten.
+        """What one run of SciPy's method found, from y = 0 or without a K* from u = `state`, and how many values of F
+        it took. SciPy asks for the one at its start first: a value that is `known` is handed over and forgotten.
         """
         values = 0
 
         def moved(y: np.ndarray) -> np.ndarray:
-            return state + (tangent.solve(y) if self.precondition and y.any() else y)
+            if tangent is None:
+                return y
+            return state + (tangent.solve(y) if y.any() else y)
 
         def shifted(y: np.ndarray) -> np.ndarray:
             nonlocal values
@@ -82,14 +96,13 @@ class ScipyRoot(NonlinearSolver):
 
         def columns(y: np.ndarray) -> np.ndarray:
             jacobian = problem.jacobian(moved(y))
-            directions = (tangent.solve(e) if self.precondition else e for e in np.eye(len(y)))
+            directions = (e if tangent is None else tangent.solve(e) for e in np.eye(len(y)))
             return np.stack([jacobian @ direction for direction in directions], axis=1)
 
         given = columns if self.method == "hybr" and self.jacobian == "products" else None
         try:
-            found = scipy.optimize.root(
-                shifted, np.zeros_like(state), jac=given, method=self.method, options=self._options(goal)
-            )
+            begin = state if tangent is None else np.zeros_like(state)
+            found = scipy.optimize.root(shifted, begin, jac=given, method=self.method, options=self._options(goal))
         except ValueError as error:  # how SciPy's Jacobians say that a step or a pivot vanished
             raise SolveError(Status.STAGNATED, f"scipy.optimize.root, {self.method}: {error}") from error
         return found, values
@@ -100,7 +113,8 @@ class ScipyRoot(NonlinearSolver):
         if self.method == "df-sane":
             return {"fatol": goal, "ftol": 0.0, "fnorm": np.linalg.norm, "maxfev": self.iterations}
         options = {"fatol": goal, "tol_norm": np.linalg.norm, "maxiter": self.iterations}
-        return options if self.method == "krylov" else options | {"jac_options": {"alpha": MATRIX_IS_ONE}}
+        begins_at_one = self.precondition and self.method != "krylov"
+        return options | ({"jac_options": {"alpha": MATRIX_IS_ONE}} if begins_at_one else {})
 
 
 def reported(found: Any) -> dict[str, float]:
