@@ -90,6 +90,19 @@ def run(
     retry: Annotated[
         list[str] | None, typer.Option(metavar="STATUS", help="run finished cases of this status again")
     ] = None,
+    only: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="EXPR", help="run only cases with solver.kind=anm (or a pattern), a status, or a case's id"
+        ),
+    ] = None,
+    skip: Annotated[list[str] | None, typer.Option(metavar="EXPR", help="leave these cases out, as --only")] = None,
+    failed: Annotated[
+        bool, typer.Option("--failed", help="run again only what crashed or was stopped at a limit")
+    ] = False,
+    shard: Annotated[
+        str | None, typer.Option(metavar="I/N", help="run every N-th case from the I-th on, for batch arrays")
+    ] = None,
 ) -> None:
     """Run a study, or the part of it that is not yet in the results folder."""
     folder = out or default_folder(study, quick)
@@ -106,6 +119,10 @@ def run(
                 jobs=jobs,
                 retry=statuses(retry or []),
                 debugger=watch.debug if pdb else None,
+                only=only or [],
+                skip=skip or [],
+                failed=failed,
+                shard=shard,
             )
     print_results(results, as_json)
     say_excluded(checked)

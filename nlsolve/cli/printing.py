@@ -98,7 +98,7 @@ def print_results(results: Results, as_json: bool) -> None:
         print_table(declared)
     if not tables:
         swept = list(dict.fromkeys(name for case in results.study.cases for name in case.swept))
-        print_frame(results.study.question, results.runs[["case", *swept, "status", "message"]])
+        print_frame(results.study.question, results.runs.reindex(columns=["case", *swept, "status", "message"]))
 
 
 def print_plugins(rows: list[PluginRow]) -> None:
@@ -115,7 +115,7 @@ def say_endings(results: Results) -> None:
     """Say how many cases ended how, with the message of one case of each ending that is no convergence."""
     runs = results.runs
     endings = ", ".join(f"{number} {word}" for word, number in runs["status"].value_counts().items())
-    say(f"{count(len(runs))}: {endings}; results in {results.folder}")
+    say(f"{count(len(runs))}: {endings or 'none has ended'}; results in {results.folder}")
     firsts = {status_of(run): run for run in rows_of(runs.drop_duplicates("status"))}
     firsts.pop(Status.CONVERGED, None)
     crash = firsts.pop(Status.CRASHED, None)

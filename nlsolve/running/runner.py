@@ -11,12 +11,13 @@ from typing import Any
 
 import pandas as pd
 
-from nlsolve.contracts.status import STOPPED, Status
+from nlsolve.contracts.status import Status
 from nlsolve.registry.problems import StudyError, did_you_mean
 from nlsolve.results.frames import Frames, Part, rows_of
 from nlsolve.running.engines.choice import engine_for
 from nlsolve.running.engines.engine import Event, Listener
 from nlsolve.running.engines.execution import Debugger
+from nlsolve.running.portions.portion import FAILED, portion_of
 from nlsolve.running.store.parts import Parts, StoreError, merge
 from nlsolve.running.store.reading import completed, description_of, environments_of, finished, of_one_source
 from nlsolve.running.store.store import Store
@@ -51,11 +52,13 @@ class Results:
     @property
     def crashed(self) -> int:
         """How many cases stopped on an error in the program or in a plugin, or were stopped at a limit."""
-        return int(self.runs["status"].isin([status.word for status in (Status.CRASHED, *STOPPED)]).sum())
+        return int(self.runs["status"].isin([status.word for status in FAILED]).sum())
 
     @property
     def findings(self) -> tuple[Finding, ...]:
-        """What the study expects to find, and whether these runs bear it out."""
+        """What the study expects to find, and whether these runs bear it out; nothing until all cases are finished."""
+        if len(self.runs) < len(self.study.cases):
+            return ()
         return judged(self.study.expectations, self.study.tables, self.runs)
 
     def tables(self) -> list[Table]:
@@ -82,6 +85,10 @@ def run(
     jobs: int | None = None,
     retry: Collection[Status] = (),
     debugger: Debugger | None = None,
+    only: str | Collection[str] = (),
+    skip: str | Collection[str] = (),
+    failed: bool = False,
+    shard: str | None = None,
 ) -> Results:
     """Run every case of a study that has not been run before, and keep the results in `out` (None: in memory).
 
@@ -91,7 +98,12 @@ def run(
     retry : statuses of cases that are run again. Cases with an error of the program or of a plugin, and those whose
         method did not apply, always are, and those stopped at a limit when it has been raised.
     debugger : is called with an error before it becomes a row; the cases then run in this process.
+    only, skip : run the cases that fit one of `only`, and none that fits one of `skip`: "solver.kind=anm", a value or a
+        pattern, several joined by " and "; a status ("timed out"; "left" for no ending yet); or the id of a case.
+    failed : run only the cases that crashed or were stopped at a limit when they were run last, again.
+    shard : "i/n": run every n-th case of the study's order, from the i-th on. n shards have all cases.
 
+    The results have whatever is finished of the study, and a note says how much of it that is.
     An interruption loses only the cases that are running; the same call later runs those that are left.
 
     Raises StudyError for a study that is not valid and for settings that do not go together, StoreError for a folder
@@ -99,29 +111,31 @@ def run(
     """
     study = study_of(study, overrides, quick)
     engine = engine_for(study.timing, isolation, jobs, debugger)
-    store = None if out is None else Store(Path(out), study, retry)
+    portion = portion_of(study, only, skip, failed, shard)
+    store = None if out is None else Store(Path(out), study, {*retry, *portion.retry})
+    chosen = None if portion.is_whole else portion.cases(study, None if store is None else store.ending)
     tell = listen or (lambda event: None)
     if store is not None and (unchanged := store.unchanged()) is not None:
         frames, notes = unchanged
         for number, (case, row) in enumerate(zip(study.cases, rows_of(frames.runs), strict=True), 1):
             tell(Event(case, number, len(study.cases), run=row, resumed=True))
         return Results(study, frames.runs, frames.steps, frames.fields, store.folder, notes)
-    turns = Turns(study, store)
+    turns = Turns(study, store, chosen)
     written = time.monotonic()
     try:
         with closing(engine.parts(turns.each(tell), study.timing, tell)) as ended:
             for turn, again in ended:
                 part = turns.end(turn, again)
                 if store is not None and time.monotonic() - written > SECONDS_BETWEEN_FRAMES:
-                    store.write_frames(_merged(study, turns.parts))
+                    store.write_frames(_merged(study, turns.gather()))
                     written = time.monotonic()
                 tell(turn.event(run=part.run))
     finally:
-        frames = _merged(study, turns.parts)
+        frames = _merged(study, turns.gather())
         if store is not None:
             store.close()
             store.write_frames(frames)
-    notes = tuple(engine.notes)
+    notes = (*engine.notes, *_unfinished(len(frames.runs), len(study.cases), bool(study.expectations)))
     if store is None:
         return Results(study, frames.runs, frames.steps, frames.fields, notes=notes)
     notes += _show(store, study, frames)
@@ -145,8 +159,7 @@ def load(folder: str | Path) -> Results:
     if not len(frames.runs):
         raise StoreError(f"{folder}: no finished cases can be read there")
     study = Study(place.name, "", ()) if described is None else described.study()
-    left = len(planned) - len(frames.runs)
-    notes = (f"{len(frames.runs)} of {len(planned)} cases are finished",) if left else ()
+    notes = _unfinished(len(frames.runs), len(planned))
     return Results(study, frames.runs, frames.steps, frames.fields, place, notes)
 
 
@@ -168,6 +181,12 @@ def _merged(study: Study, parts: Mapping[str, Part]) -> Frames:
     frames = merge([parts[case.id] for case in study.cases if case.id in parts])
     references = {case.id: case.reference for case in study.cases if case.reference}
     return completed(frames, references)
+
+
+def _unfinished(finished: int, planned: int, judges: bool = False) -> tuple[str, ...]:
+    """A sentence on how much of a study is finished; none when all of it is. judges : whether it expects a finding."""
+    later = "; what the study expects is judged when all are" if judges else ""
+    return (f"{finished} of {planned} cases are finished{later}",) if finished < planned else ()
 
 
 def _tables(study: Study, runs: pd.DataFrame) -> tuple[list[Table], list[str]]:

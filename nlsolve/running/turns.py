@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter, deque
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 from nlsolve.results.frames import Part
@@ -11,6 +11,7 @@ from nlsolve.running.engines.engine import Listener, Turn
 from nlsolve.running.retry import is_final, lacks_something
 from nlsolve.running.store.standing import rounds_of
 from nlsolve.running.store.store import Store
+from nlsolve.study.case import Case
 from nlsolve.study.study import Study
 from nlsolve.study.timing import Timing
 
@@ -18,18 +19,22 @@ from nlsolve.study.timing import Timing
 class Turns:
     """What is left of a run. Two runs on one folder take different cases, and each reads what the other has computed.
 
+    chosen : the cases that the run is for; absent: all.
     parts : case -> its part so far, whoever has computed it.
     """
 
-    def __init__(self, study: Study, store: Store | None) -> None:
+    def __init__(self, study: Study, store: Store | None, chosen: Sequence[Case] | None = None) -> None:
         self.timing, self.store = study.timing, store
         self.parts: dict[str, Part] = {}
-        pairs = [(turn, case) for turn in range(1, study.timing.rounds + 1) for case in study.cases]
+        cases = study.cases if chosen is None else chosen
+        ours = {case.id for case in cases}
+        self._others = [case for case in study.cases if case.id not in ours]
+        pairs = [(turn, case) for turn in range(1, study.timing.rounds + 1) for case in cases]
         turns = [(turn, Turn(case, number, len(pairs))) for number, (turn, case) in enumerate(pairs, 1)]
         self._waiting = deque(turns)
         self._failed_elsewhere: set[str] = set()
         self._ended: Counter[str] = Counter()
-        for case in study.cases if store is not None else ():
+        for case in cases if store is not None else ():
             self._look_up(Turn(case, 0, 0))
 
     def each(self, tell: Listener) -> Iterator[Turn | None]:
@@ -47,6 +52,14 @@ class Turns:
                 tell(replace(turn.event(run=self.parts[turn.case.id].run), resumed=True))
             else:
                 yield found and found[1]
+
+    def gather(self) -> dict[str, Part]:
+        """The parts so far, and what the folder has by now of the cases that this run is not for."""
+        if self.store is not None:
+            for case in self._others:
+                if case.id not in self.parts and (found := self.store.finished(case)) is not None:
+                    self.parts[case.id] = found
+        return self.parts
 
     def end(self, turn: Turn, again: Part) -> Part:
         """Keep the part of a turn that has ended, and give up the claim; returns the part of its case."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections import defaultdict
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -62,16 +62,24 @@ class Standings:
         enough = is_final(run) or rounds_of(run, self.timing) >= self.timing.rounds
         return Standing(identity, KEPT if enough else TIMED, entry)
 
+    def last(self, case: Case) -> Entry | None:
+        """How a case ended last, even if its source or a file has changed since; None when nothing is known of it."""
+        entry = self.parts.entry(identity_of(case).key)
+        return entry if entry is not None else self._latest(self._keys.get(case.id, []))
+
     def _why(self, identity: Identity) -> str:
         """Why no part stands for an identity: what has changed since the last part of its case, if there is one."""
         keys = self._keys.get(identity.case, [])
         if identity.key in keys:
             return DAMAGED
-        earlier = [entry for entry in map(self.parts.entry, keys) if entry is not None]
-        if not earlier:
+        last = self._latest(keys)
+        if last is None:
             return DAMAGED if keys else NEW
-        last = max(earlier, key=lambda entry: entry.written)
         return ", ".join(identity.changes_since(last.identity))
+
+    def _latest(self, keys: Iterable[str]) -> Entry | None:
+        found = [entry for entry in map(self.parts.entry, keys) if entry is not None]
+        return max(found, key=lambda entry: entry.written, default=None)
 
 
 def standings_of(parts: Parts, study: Study, retry: Collection[Status] = ()) -> dict[str, str]:

@@ -16,6 +16,8 @@ import pandas as pd
 
 from nlsolve.contracts.status import Status
 from nlsolve.results.frames import Frames, Part
+from nlsolve.results.verdicts import status_of
+from nlsolve.running.portions.condition import LEFT
 from nlsolve.running.store.claims import CLAIMS, Claims
 from nlsolve.running.store.identity import Identity, identity_of
 from nlsolve.running.store.parts import (
@@ -72,6 +74,17 @@ class Store:
         if frames is None:
             return None
         return Part(standing.entry.run(names_in(case)), *frames)
+
+    def finished(self, case: Case) -> Part | None:
+        """The part of a case as `load` gives it, also where it is to be tried again; None when there is none."""
+        entry = self.parts.entry(identity_of(case).key)
+        frames = None if entry is None else self.parts.frames(entry)
+        return None if entry is None or frames is None else Part(entry.run(names_in(case)), *frames)
+
+    def ending(self, case: Case) -> str:
+        """The word of the status with which a case ended last, or `LEFT`."""
+        entry = self._standings.last(case)
+        return LEFT if entry is None else status_of(entry.measured).word
 
     def begin(self, case: Case) -> bool:
         """Claim a case, so that no other run computes it; False while another run has it."""
