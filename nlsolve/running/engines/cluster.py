@@ -8,6 +8,8 @@ from __future__ import annotations
 
 import os
 import secrets
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from dataclasses import replace
 from typing import Any
 
@@ -28,6 +30,9 @@ from nlsolve.solving.simulate import Progress
 
 SECONDS_TO_CONNECT = 10
 """Time for a scheduler to answer [s]."""
+
+
+GONE = "the scheduler of the cluster is gone: the finished cases are kept, and the same command does the rest"
 
 
 class Cluster(SideBySide):
@@ -69,7 +74,8 @@ class _Hosts(Crew):
 
     @property
     def room(self) -> int:
-        return self.jobs or max(1, sum(self._client.nthreads().values()))
+        with _reaching():
+            return self.jobs or max(1, sum(self._client.nthreads().values()))
 
     def start(self, turn: Turn, task: Task) -> None:
         parts = turn.case.parts
@@ -81,7 +87,8 @@ class _Hosts(Crew):
             os.getcwd(),
         )
         key = f"nlsolve-{turn.case.id}-{self.token}-{turn.number}"
-        future = self._client.submit(host.do, assignment, key=key, pure=False)
+        with _reaching():
+            future = self._client.submit(host.do, assignment, key=key, pure=False)
         self._given[turn.number] = turn, future
         future.add_done_callback(lambda done: self.reports.put(Report(turn, _ending(task, done))))
 
@@ -89,8 +96,9 @@ class _Hosts(Crew):
         self._given.pop(turn.number)
 
     def end(self) -> None:
-        self._client.cancel([future for _, future in self._given.values()])
-        self._client.run(host.stop, self.token, on_error="ignore")
+        with suppress(OSError):  # where the scheduler is gone there is nobody to tell
+            self._client.cancel([future for _, future in self._given.values()])
+            self._client.run(host.stop, self.token, on_error="ignore")
         self._client.close()
         if self._cluster is not None:
             self._cluster.close()
@@ -103,10 +111,19 @@ class _Hosts(Crew):
             self.reports.put(Report(given[0], Progress(**progress)))
 
 
+@contextmanager
+def _reaching() -> Iterator[None]:
+    """Turn a scheduler that cannot be reached into an InputError."""
+    try:
+        yield
+    except OSError as error:
+        raise InputError(GONE) from error
+
+
 def _ending(task: Task, done: Future) -> Part | Exception:
     """The part of a task that has ended, or the error that ends the run."""
     if done.status == "cancelled":
-        return InputError("the scheduler of the cluster is gone: the same command does the rest")
+        return InputError(GONE)
     try:
         found: Part | Unreadable = done.result()
     except KilledWorker:

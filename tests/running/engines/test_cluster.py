@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import os
 import signal
+import subprocess
+import sys
 from collections.abc import Iterator
 from typing import Any
 
@@ -100,6 +102,32 @@ def test_an_interruption_stops_what_runs_there():
         run(document(planted.Sound(), planted.Loops()), engine="dask", jobs=2, listen=interrupt)
     _, alive = psutil.wait_procs(set(psutil.Process().children(recursive=True)) - before, timeout=10)
     assert alive == []
+
+
+SCHEDULER = """
+import time
+from distributed import LocalCluster
+where = {"host": "127.0.0.1", "protocol": "tcp", "dashboard_address": "127.0.0.1:0"}
+print(LocalCluster(n_workers=1, threads_per_worker=2, processes=False, **where).scheduler_address, flush=True)
+time.sleep(300)
+"""
+
+
+@pytest.mark.slow
+def test_a_scheduler_that_is_gone_ends_the_run_with_a_sentence(tmp_path):
+    with subprocess.Popen([sys.executable, "-c", SCHEDULER], stdout=subprocess.PIPE, text=True) as there:
+        assert there.stdout is not None
+        address = there.stdout.readline().strip()
+
+        def kill(event: Event) -> None:
+            if event.run is not None:
+                there.kill()
+
+        with pytest.raises(
+            nlsolve.InputError, match="the scheduler of the cluster is gone: the finished cases are kept"
+        ):
+            run(document(planted.Sound(), planted.Loops()), tmp_path, engine="dask", scheduler=address, listen=kill)
+    assert nlsolve.load(tmp_path).runs["solver.kind"].tolist() == ["sound"]
 
 
 def test_a_cluster_with_other_source_is_refused(monkeypatch):
