@@ -87,6 +87,12 @@ def run(
         typer.Option(metavar="HOW", help="process: each case in a worker process, the default; none: all in this one"),
     ] = None,
     pdb: Annotated[bool, typer.Option("--pdb", help="debug an error where it is raised; no isolation")] = False,
+    engine: Annotated[
+        str | None, typer.Option(metavar="NAME", help="local: on this machine, the default; dask: on a cluster")
+    ] = None,
+    scheduler: Annotated[
+        str | None, typer.Option(metavar="ADDRESS", help="scheduler of the cluster; default: one of this machine")
+    ] = None,
     retry: Annotated[
         list[str] | None, typer.Option(metavar="STATUS", help="run finished cases of this status again")
     ] = None,
@@ -119,6 +125,8 @@ def run(
                 jobs=jobs,
                 retry=statuses(retry or []),
                 debugger=watch.debug if pdb else None,
+                engine=engine,
+                scheduler=scheduler,
                 only=only or [],
                 skip=skip or [],
                 failed=failed,

@@ -85,6 +85,8 @@ def run(
     jobs: int | None = None,
     retry: Collection[Status] = (),
     debugger: Debugger | None = None,
+    engine: str | None = None,
+    scheduler: str | None = None,
     only: str | Collection[str] = (),
     skip: str | Collection[str] = (),
     failed: bool = False,
@@ -94,10 +96,13 @@ def run(
 
     listen : is called with each `Event`.
     isolation : "process": every case in a worker process, within its limits (the default); "none": in this process.
-    jobs : cases at a time; by default as many as there are physical cores, but one if the study says how it is timed.
+    jobs : cases at a time; by default as many as there are physical cores, or threads of the cluster, but one if the
+        study says how it is timed.
     retry : statuses of cases that are run again. Cases with an error of the program or of a plugin, and those whose
         method did not apply, always are, and those stopped at a limit when it has been raised.
     debugger : is called with an error before it becomes a row; the cases then run in this process.
+    engine : "local": worker processes on this machine (the default); "dask": on a cluster of dask.distributed.
+    scheduler : the address of that cluster's scheduler; absent: a cluster of this machine.
     only, skip : run the cases that fit one of `only`, and none that fits one of `skip`: "solver.kind=anm", a value or a
         pattern, several joined by " and "; a status ("timed out"; "left" for no ending yet); or the id of a case.
     failed : run only the cases that crashed or were stopped at a limit when they were run last, again.
@@ -110,7 +115,7 @@ def run(
     that cannot hold its results.
     """
     study = study_of(study, overrides, quick)
-    engine = engine_for(study.timing, isolation, jobs, debugger)
+    chosen_engine = engine_for(study.timing, isolation, jobs, debugger, engine, scheduler)
     portion = portion_of(study, only, skip, failed, shard)
     store = None if out is None else Store(Path(out), study, {*retry, *portion.retry})
     chosen = None if portion.is_whole else portion.cases(study, None if store is None else store.ending)
@@ -123,7 +128,7 @@ def run(
     turns = Turns(study, store, chosen)
     written = time.monotonic()
     try:
-        with closing(engine.parts(turns.each(tell), study.timing, tell)) as ended:
+        with closing(chosen_engine.parts(turns.each(tell), study.timing, tell)) as ended:
             for turn, again in ended:
                 part = turns.end(turn, again)
                 if store is not None and time.monotonic() - written > SECONDS_BETWEEN_FRAMES:
@@ -135,7 +140,7 @@ def run(
         if store is not None:
             store.close()
             store.write_frames(frames)
-    notes = (*engine.notes, *_unfinished(len(frames.runs), len(study.cases), bool(study.expectations)))
+    notes = (*chosen_engine.notes, *_unfinished(len(frames.runs), len(study.cases), bool(study.expectations)))
     if store is None:
         return Results(study, frames.runs, frames.steps, frames.fields, notes=notes)
     notes += _show(store, study, frames)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from importlib import import_module
+from importlib.util import find_spec
 
 import psutil
 
@@ -20,21 +21,40 @@ ISOLATION = "process"
 """How they are where nobody says."""
 
 
+ENGINES = ("local", "dask")
+"""Where the worker processes are: on this machine, or where a cluster of dask.distributed has room."""
+
+
 def engine_for(
-    timing: Timing, isolation: str | None = None, jobs: int | None = None, debugger: Debugger | None = None
+    timing: Timing,
+    isolation: str | None = None,
+    jobs: int | None = None,
+    debugger: Debugger | None = None,
+    engine: str | None = None,
+    scheduler: str | None = None,
 ) -> Engine:
     """The engine for these wishes.
 
-    jobs : cases at a time; None: as many as there are physical cores, but one where the study says how it is timed.
+    jobs : cases at a time; None: as many as there are physical cores, or threads of the cluster, but one where the
+        study says how it is timed.
+    scheduler : address of the scheduler of a cluster; None: one in this process.
     debugger : see `execute`; only for cases in this process.
 
     Raises StudyError for wishes that do not go together.
     """
-    chosen = isolation or ("none" if debugger is not None else ISOLATION)
+    chosen = isolation or ("none" if debugger is not None else "process" if engine == "dask" else ISOLATION)
     if chosen not in ISOLATIONS:
         raise StudyError(f"isolation = {chosen!r}: no such isolation; {did_you_mean(chosen, ISOLATIONS)}")
     if jobs is not None and jobs < 1:
         raise StudyError(f"jobs = {jobs}: at least one case at a time is run")
+    if engine not in (None, *ENGINES):
+        raise StudyError(f"engine = {engine!r}: no such engine; {did_you_mean(engine or '', ENGINES)}")
+    if scheduler is not None and engine != "dask":
+        raise StudyError(f"scheduler = {scheduler!r}: only the engine 'dask' has one; add it, or drop the scheduler")
+    if engine == "dask":
+        if chosen == "none":
+            raise StudyError("the engine 'dask' runs each case in a worker process: drop it, or isolation and debugger")
+        return _on_cluster(jobs or (None if timing == Timing() else 1), scheduler)
     if chosen == "none":
         if jobs not in (None, 1):
             raise StudyError(f"jobs = {jobs}: without isolation the cases run one after the other; drop one of the two")
@@ -42,13 +62,21 @@ def engine_for(
     if debugger is not None:
         raise StudyError("a debugger needs the cases in this process: drop isolation, or set it to none")
     if os.name != "posix":
-        engine = InProcess()
-        engine.note("this system has no process groups: the cases were run in this process, without limits")
-        return engine
+        here = InProcess()
+        here.note("this system has no process groups: the cases were run in this process, without limits")
+        return here
     workers: Engine = import_module("nlsolve.running.engines.local").Workers(
         jobs or (physical_cores() if timing == Timing() else 1)
     )
     return workers
+
+
+def _on_cluster(jobs: int | None, scheduler: str | None) -> Engine:
+    if find_spec("distributed") is None:
+        raise StudyError("the engine 'dask' needs dask.distributed: pip install 'nlsolve[dask]', or use 'local'")
+    here = None if scheduler is not None else physical_cores()
+    engine: Engine = import_module("nlsolve.running.engines.cluster").Cluster(jobs or here, scheduler)
+    return engine
 
 
 def physical_cores() -> int:

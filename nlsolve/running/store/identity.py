@@ -6,7 +6,7 @@ Names of tables and settings, the question, the order of sweeps and the other ca
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -61,12 +61,19 @@ def case_of(key: str) -> str:
 
 def identity_of(case: Case) -> Identity:
     """The identity of a case as it would be run now."""
-    code: dict[str, str] = {}
     files: dict[str, str] = {}
     for value in _models(case.parts):
-        code |= sources_of(type(value))
         files |= {str(path): _content(path) for path in files_read(value)}
-    return Identity(case.id, dict(sorted(code.items())), dict(sorted(files.items())))
+    return Identity(case.id, code_of(value for _, value in case.parts), dict(sorted(files.items())))
+
+
+def code_of(sections: Iterable[Any]) -> dict[str, str]:
+    """Package -> version and fingerprint of its source, for the classes of these components at any depth."""
+    found: dict[str, str] = {}
+    for section in sections:
+        for value in _inside(section):
+            found |= sources_of(type(value))
+    return dict(sorted(found.items()))
 
 
 def files_read(value: BaseModel) -> Iterator[Path]:

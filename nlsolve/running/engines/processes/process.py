@@ -52,11 +52,12 @@ _now = time.monotonic
 class WorkerProcess:
     """A worker process and all processes that descend from it.
 
+    folder : the folder in which it works; absent: that of this process.
     gone : whether it will not answer any more.
     begun : when it was started, by the monotonic clock [s].
     """
 
-    def __init__(self) -> None:
+    def __init__(self, folder: str | None = None) -> None:
         self.connection, theirs = multiprocessing.Pipe()
         self._faults = tempfile.TemporaryFile(buffering=0)  # noqa: SIM115  # closed by `kill`
         self._output, written = os.pipe()
@@ -65,6 +66,7 @@ class WorkerProcess:
         self.begun = _now()
         self._popen = subprocess.Popen(
             [sys.executable, "-P", "-c", BOOT, json.dumps(argument)],
+            cwd=folder,
             stdin=subprocess.DEVNULL,
             stdout=written,
             stderr=written,

@@ -6,7 +6,7 @@ import io
 import pickle
 import sys
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from importlib.util import find_spec, module_from_spec, spec_from_file_location
 from types import SimpleNamespace
 from typing import Any
@@ -14,6 +14,7 @@ from typing import Any
 from nlsolve.contracts.component import Component
 from nlsolve.results.frames import Part
 from nlsolve.running.engines.places import components_in, named
+from nlsolve.running.store.identity import code_of
 from nlsolve.study.case import Case
 from nlsolve.study.limits import Limits
 from nlsolve.study.timing import Timing
@@ -36,6 +37,7 @@ class Task:
 
     sections : each component, pickled by itself, so that the one that fails can be named.
     files : module -> its file, for the modules of the components, which need not be installed.
+    code : package -> version and fingerprint of its source, as `code_of` the components, where they must be the same.
     """
 
     case: str
@@ -44,12 +46,18 @@ class Task:
     files: Mapping[str, str]
     limits: Limits
     timing: Timing
+    code: Mapping[str, str] = field(default_factory=dict)
 
     def parts(self) -> Sections:
-        """The components of the case. Raises NotPortable for one that this process cannot import."""
+        """The components of the case. Raises NotPortable for one that this process cannot import, or has otherwise."""
         for module, file in self.files.items():
             _load(module, file)
-        return Sections(**{name: _unpacked(name, data) for name, data in self.sections.items()})
+        found = {name: _unpacked(name, data) for name, data in self.sections.items()}
+        here = code_of(found.values()) if self.code else {}
+        for name, source in self.code.items():
+            if here.get(name) != source:
+                raise NotPortable(f"{name} is {here.get(name, 'missing')} there and {source} here")
+        return Sections(**found)
 
 
 @dataclass(frozen=True)
