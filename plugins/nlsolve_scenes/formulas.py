@@ -6,6 +6,7 @@ The text is parsed, never executed. It may hold numbers, x, y, pi, e, + − * / 
 from __future__ import annotations
 
 import ast
+import math
 import operator
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -18,7 +19,7 @@ from pydantic import AfterValidator, Field
 from nlsolve.plugin import Series
 
 FUNCTIONS = {f.__name__: f for f in (np.sin, np.cos, np.tanh, np.sinh, np.cosh, np.exp, np.log, np.sqrt)}
-CONSTANTS = {"pi": np.float64(np.pi), "e": np.float64(np.e)}
+CONSTANTS = {"pi": np.float64(math.pi), "e": np.float64(math.e)}
 BINARY: dict[type[ast.operator], Callable[[Any, Any], Any]] = {
     ast.Add: operator.add,
     ast.Sub: operator.sub,
