@@ -21,6 +21,7 @@ from nlsolve.cli.options import (
     Quick,
     Settings,
     StudyFile,
+    checked_study,
     default_folder,
     registry_of,
 )
@@ -45,8 +46,6 @@ from nlsolve.running.store.parts import Parts
 from nlsolve.running.store.standing import KEPT, standings_of
 from nlsolve.study.case import section_rows
 from nlsolve.study.keys.schema import study_schema
-from nlsolve.study.study import Study
-from nlsolve.study.sweeps import parse_assignments
 
 app = typer.Typer(
     help="Compare nonlinear solution strategies on equal terms.", no_args_is_help=True, pretty_exceptions_enable=False
@@ -114,8 +113,7 @@ def run(
     folder = out or default_folder(study, quick)
     console = Console(stderr=True)
     with ending(folder):
-        registry = registry_of(plugin, disable_plugin)
-        checked = Study.from_toml(study, parse_assignments(settings or []), quick, registry)
+        checked = checked_study(study, settings, quick, plugin, disable_plugin)
         with Watch(console) as watch:
             results = run_study(
                 checked,
@@ -155,9 +153,8 @@ def validate(
 ) -> None:
     """Check a study, and its quick form if it has one, without running it."""
     with ending():
-        overrides, registry = parse_assignments(settings or []), registry_of(plugin, disable_plugin)
-        checked = Study.from_toml(study, overrides, registry=registry)
-        quick = Study.from_toml(study, overrides, quick=True, registry=registry) if checked.has_quick else None
+        checked = checked_study(study, settings, False, plugin, disable_plugin)
+        quick = checked_study(study, settings, True, plugin, disable_plugin) if checked.has_quick else None
     found = {"study": checked.name, "question": checked.question, "cases": len(checked.cases)}
     found |= {"quick_cases": len(quick.cases)} if quick else {}
     found |= {"excluded": [asdict(excluded) for excluded in checked.excluded]} if checked.excluded else {}
@@ -182,8 +179,7 @@ def plan(
     """List the cases of a study, which of them are to be run and why, and forecast what they cost."""
     folder = out or default_folder(study, quick)
     with ending():
-        registry = registry_of(plugin, disable_plugin)
-        checked = Study.from_toml(study, parse_assignments(settings or []), quick, registry)
+        checked = checked_study(study, settings, quick, plugin, disable_plugin)
         words = standings_of(Parts(folder), checked)
         frame = forecast(checked)
     frame.insert(1, "plan", frame["case"].map(words))
@@ -211,8 +207,7 @@ def diagnose(
 ) -> None:
     """Measure the operators on the clouds of a study: supports, balance, reproduction, largest weight."""
     with ending():
-        registry = registry_of(plugin, disable_plugin)
-        frame = diagnostics_of(Study.from_toml(study, parse_assignments(settings or []), quick, registry))
+        frame = diagnostics_of(checked_study(study, settings, quick, plugin, disable_plugin))
     if as_json:
         typer.echo(json.dumps(json_rows(frame)))
     else:

@@ -18,8 +18,8 @@ from nlsolve.cli.options import (
     Quick,
     Settings,
     StudyFile,
+    checked_study,
     default_folder,
-    registry_of,
 )
 from nlsolve.cli.printing import count, print_table, say
 from nlsolve.registry.problems import StudyError, did_you_mean
@@ -27,8 +27,6 @@ from nlsolve.running.store.reading import FolderStatus, read_tables, status_of_f
 from nlsolve.running.store.upkeep import export as packed
 from nlsolve.running.store.upkeep import merge_folders, remove, superfluous
 from nlsolve.show.tables import build
-from nlsolve.study.study import Study
-from nlsolve.study.sweeps import parse_assignments
 
 folders = typer.Typer()
 
@@ -137,8 +135,7 @@ def export(
     folder, target = out or default_folder(study, quick), to or Path(f"{study.stem}.zip")
     options = [word for setting in settings or [] for word in ("--set", setting)] + ["--quick"] * quick
     with ending():
-        registry = registry_of(plugin, disable_plugin)
-        checked = Study.from_toml(study, parse_assignments(settings or []), quick, registry)
+        checked = checked_study(study, settings, quick, plugin, disable_plugin)
         missing = packed(checked, study.read_text(encoding="utf-8"), shlex.join(options), folder, target)
     for path in missing:
         say(f"{path} is not in the zip: the study must name it by a path within the folder it is run in")

@@ -10,6 +10,8 @@ import typer
 from nlsolve.cli.disabling import disable
 from nlsolve.registry.plugin_files import with_files
 from nlsolve.registry.registry import Registry, load_registry
+from nlsolve.study.study import Study
+from nlsolve.study.sweeps import parse_assignments
 
 StudyFile = Annotated[Path, typer.Argument(metavar="STUDY", help="a study file (TOML)")]
 Settings = Annotated[
@@ -37,3 +39,10 @@ def registry_of(files: list[Path] | None, disabled: list[str] | None) -> Registr
     """The installed plugins but those disabled, and those of files. Raises StudyError for one that cannot be used."""
     disable(disabled or [])
     return with_files(load_registry(), files or [])
+
+
+def checked_study(
+    path: Path, settings: list[str] | None, quick: bool, files: list[Path] | None, disabled: list[str] | None
+) -> Study:
+    """The study of a file with these settings and plugins. Raises StudyError for one that is not valid."""
+    return Study.from_toml(path, parse_assignments(settings or []), quick, registry_of(files, disabled))
