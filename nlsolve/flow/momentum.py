@@ -14,11 +14,12 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.spatial import cKDTree
 
-from nlsolve.contracts.continuum.cloud import Cloud
+from nlsolve.contracts.continuum.cloud import Cloud, node_major
 from nlsolve.contracts.continuum.discretizer import Discretizer, Operators
 from nlsolve.contracts.continuum.law import ConstitutiveLaw, Number, rate_squared, stress, tangent_moduli
 from nlsolve.contracts.problem import Expansion, NonlinearProblem
 from nlsolve.contracts.status import SolveError, Status
+from nlsolve.flow.convection import Carried, Convection
 from nlsolve.flow.motion.point_rates import PointRates
 from nlsolve.series import Array, NoSeriesHere, Series
 
@@ -31,14 +32,6 @@ class Inertia:
 
     density_over_increment: float
     previous: Array
-
-
-@dataclass(frozen=True)
-class Convection:
-    """ρ [t/mm³] and the (N, N) matrices of ∂/∂x and ∂/∂y at the nodes."""
-
-    density: float
-    gradient: tuple[Any, Any]
 
 
 class Flow(NonlinearProblem):
@@ -86,7 +79,7 @@ class Flow(NonlinearProblem):
         self._gradient: Any = None
         self._dilatation: Any = None
         self._inertia: Any = None
-        self._carried: _Carried | None = None
+        self._carried: Carried | None = None
         areas = self._areas = np.ones(len(self._free)) * (
             1.0 if operators.node_areas is None else np.repeat(operators.node_areas, 2)
         )
@@ -107,7 +100,7 @@ class Flow(NonlinearProblem):
             self._inertia = areas * np.full(len(self._free), inertia.density_over_increment)
             constant -= self._inertia * inertia.previous[cloud.interior].ravel()
         if convection is not None:
-            self._carried = _Carried(convection, cloud, areas, lifted)
+            self._carried = Carried(convection, cloud, areas, lifted)
         if body_force is not None:
             constant -= areas * body_force.ravel()
         self._constant = constant
@@ -312,34 +305,6 @@ class _Expansion(Expansion):
             raise self._flow.without_series(self._path.coefficient(0), refusal) from refusal
 
 
-class _Carried:
-    """W ρ (v·∇) v at the interior nodes, (2F,), of interior velocities u (2F,), and its tangent."""
-
-    def __init__(self, convection: Convection, cloud: Cloud, areas: Array, lifted: Array) -> None:
-        inside, free = cloud.interior, node_major(cloud.interior)
-        self._terms = []
-        for axis, derivative in enumerate(convection.gradient):
-            # Rows node-major: ∂/∂x (or ∂/∂y) of u_i, then of v_i; beside it u_i (or v_i), the speed that carries both.
-            rows = sp.kron(sp.csr_array(derivative)[inside], sp.eye_array(2), format="csr")
-            speed = sp.kron(
-                sp.eye_array(len(inside)), sp.csr_array([[1.0 - axis, axis], [1.0 - axis, axis]]), format="csr"
-            )
-            weight = sp.diags_array(convection.density * areas)
-            self._terms.append((weight @ rows[:, free], weight @ (rows @ lifted), speed))
-
-    def force(self, u: Number) -> Number:
-        (x, x_0, speed_x), (y, y_0, speed_y) = self._terms
-        return (speed_x @ u) * (x @ u + x_0) + (speed_y @ u) * (y @ u + y_0)
-
-    def secant(self, u: Array) -> Any:
-        return sum(sp.diags_array(speed @ u) @ slope for slope, _, speed in self._terms)
-
-    def tangent(self, u: Array) -> Any:
-        return self.secant(u) + sum(
-            sp.diags_array(slope @ u + slope_0) @ speed for slope, slope_0, speed in self._terms
-        )
-
-
 def secant_moduli(law: ConstitutiveLaw, strain_rate: Array) -> Array:
     """C = 2 μ I [MPa s], shape (3, 3, M), so that s = C ε̇, for strain rates (3, M) ordered xx, yy, xy."""
     return isotropic(law.viscosity(rate_squared(strain_rate)))
@@ -348,8 +313,3 @@ def secant_moduli(law: ConstitutiveLaw, strain_rate: Array) -> Array:
 def isotropic(viscosity: Array) -> Array:
     """C = 2 μ I [MPa s], shape (3, 3, M), of viscosities μ (M,)."""
     return 2.0 * np.eye(3)[:, :, None] * viscosity
-
-
-def node_major(nodes: Any) -> Any:
-    """Indices 2 i, 2 i + 1 of the velocity components of `nodes`."""
-    return np.stack([2 * nodes, 2 * nodes + 1], axis=1).ravel()

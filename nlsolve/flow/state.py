@@ -16,7 +16,8 @@ from nlsolve.contracts.linear_solver import LinearSolver
 from nlsolve.contracts.rules.predictor import Predictor
 from nlsolve.contracts.scene import Entry
 from nlsolve.flow.continuation import Start
-from nlsolve.flow.momentum import Convection, Flow, Inertia
+from nlsolve.flow.convection import Convection
+from nlsolve.flow.momentum import Flow, Inertia
 from nlsolve.flow.motion.moving_nodes import MovingNodes
 from nlsolve.flow.motion.point_rates import Passage, PointRates
 from nlsolve.flow.observables import discretization_error

@@ -7,9 +7,8 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 
-from nlsolve.contracts.continuum.cloud import Cloud
+from nlsolve.contracts.continuum.cloud import Cloud, Indices, node_major
 from nlsolve.contracts.continuum.discretizer import Discretizer, Operators
-from nlsolve.flow.momentum import node_major
 from nlsolve.series import Array
 from nlsolve.testing.promises import require, same, shaped
 
@@ -74,7 +73,7 @@ def check_discretizer(discretizer: Discretizer, cloud: Cloud, tolerance: float =
     holds("values of a linear field", values, extent + points @ [2.0, -3.0], extent + x[free] @ [2.0, -3.0])
 
 
-def _check_adjoint(operators: Operators, free: Array) -> None:
+def _check_adjoint(operators: Operators, free: Indices) -> None:
     """S + Bᵀ A = 0 and S_θ + B_θᵀ A_θ = 0 on the unknowns; areas are ≥ 0, and > 0 at interior nodes."""
     assert operators.volumetric is not None
     assert operators.node_areas is not None

@@ -15,7 +15,8 @@ from nlsolve_scenes import Cavity, Manufactured, StirringTool
 from nlsolve_solvers.homotopy import AsymptoticNumericalMethod
 from nlsolve_solvers.modified_newton import ModifiedNewton
 
-from nlsolve.flow.momentum import Convection, Flow, Inertia
+from nlsolve.flow.convection import Convection
+from nlsolve.flow.momentum import Flow, Inertia
 from nlsolve.plugin import ConstitutiveLaw, FlowScene, Misfit, NodeMotion, Physics, TimeSteps
 from nlsolve.series import Array
 from nlsolve.solving.simulate import run_case as march

@@ -16,8 +16,9 @@ from nlsolve_scenes.nodes.rings import Rings
 from nlsolve_solvers import Newton
 
 from nlsolve import Status
+from nlsolve.contracts.continuum.cloud import node_major
 from nlsolve.contracts.continuum.law import stress
-from nlsolve.flow.momentum import Flow, Inertia, node_major
+from nlsolve.flow.momentum import Flow, Inertia
 from nlsolve.plugin import Physics, PointOperators
 from nlsolve.solving.simulate import run_case as march
 from nlsolve.solving.stopping import Budget

@@ -71,3 +71,8 @@ class Exact:
 
     velocity: Array
     quantities: Mapping[str, float] = field(default_factory=dict)
+
+
+def node_major(nodes: Indices) -> Indices:
+    """Indices 2 i, 2 i + 1 of the velocity components of `nodes`."""
+    return np.stack([2 * nodes, 2 * nodes + 1], axis=1).ravel()

@@ -24,7 +24,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from nlsolve.contracts.component import Component
-from nlsolve.contracts.continuum.cloud import Cloud
+from nlsolve.contracts.continuum.cloud import Cloud, node_major
 from nlsolve.contracts.continuum.law import CONTRACTION
 from nlsolve.series import Array
 
@@ -47,7 +47,7 @@ class PointOperators:
     @classmethod
     def conservative(cls, cloud: Cloud, rate: Any, points: Array, areas: Array) -> PointOperators:
         """The pair of a conservative form: B = `rate`, S = −Bᵀ A at the interior nodes."""
-        free = np.stack([2 * cloud.interior, 2 * cloud.interior + 1], axis=1).ravel()
+        free = node_major(cloud.interior)
         weighed = sp.diags_array(_weights(areas, rate.shape[0] // len(points)))
         return cls(rate, (-(rate[:, free].T @ weighed)).tocsr(), points, areas)
 

@@ -20,7 +20,7 @@ from pydantic import ValidationError
 from scipy.spatial import cKDTree
 
 from nlsolve import SolveError, Status
-from nlsolve.flow.momentum import node_major
+from nlsolve.contracts.continuum.cloud import node_major
 from nlsolve.plugin import Cloud, Discretizer, Operators
 from nlsolve.results.columns import DIAGNOSTICS
 from nlsolve.series import Array

@@ -17,7 +17,9 @@ from nlsolve_laws import PowerLaw
 from nlsolve_scenes import Channel, Manufactured, StirringTool
 
 from nlsolve import SolveError, Status
-from nlsolve.flow.momentum import Convection, Flow, node_major
+from nlsolve.contracts.continuum.cloud import node_major
+from nlsolve.flow.convection import Convection
+from nlsolve.flow.momentum import Flow
 from nlsolve.plugin import Cloud, Discretizer
 from nlsolve.series import Array
 

@@ -17,7 +17,8 @@ from nlsolve_scenes.nodes.rings import Rings
 from nlsolve_solvers.homotopy.branch import Branch
 from nlsolve_solvers.homotopy.forms import FixedPoint
 
-from nlsolve.flow.momentum import Flow, Inertia, node_major
+from nlsolve.contracts.continuum.cloud import node_major
+from nlsolve.flow.momentum import Flow, Inertia
 from nlsolve.series import Array, Series
 
 ORDER = 25

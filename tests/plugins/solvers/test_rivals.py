@@ -35,7 +35,8 @@ from pydantic import ValidationError
 from scipy.sparse import csr_array
 
 from nlsolve import SolveError, Status
-from nlsolve.flow.momentum import Convection, Flow
+from nlsolve.flow.convection import Convection
+from nlsolve.flow.momentum import Flow
 from nlsolve.plugin import Mixing, NonlinearProblem, NonlinearSolver, RefreshRule, TangentHistory
 from nlsolve.solving.counted_problem import CountedProblem
 from nlsolve.solving.ledger import Ledger
