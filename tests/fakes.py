@@ -56,6 +56,10 @@ class Box(FlowScene):
     side: Literal["left", "right"] = "left"
     nodes: Annotated[Even | Random, Field(discriminator="kind")] = Even()
 
+    def way(self, parts: Any) -> tuple[str, ...]:
+        """No case waits for the first state of another."""
+        return ()
+
     @property
     def reference_rate(self) -> float:
         return 1.0
@@ -237,9 +241,12 @@ def write_study(folder: Path, *changes: tuple[str, str], text: str = STUDY) -> P
 
 
 def fake_march(
-    parts: FlowCase, listen: Callable[[Progress], None] | None = None, clock: Callable[[], float] | None = None
+    parts: FlowCase,
+    listen: Callable[[Progress], None] | None = None,
+    clock: Callable[[], float] | None = None,
+    **way: Any,
 ) -> Record:
-    """A record whose numbers follow from the solver's parameters."""
+    """A record whose numbers follow from the solver's parameters; there is no way to a first state."""
     order, tolerance = getattr(parts.solver, "order", 1), getattr(parts.solver, "tolerance", 1.0)
     if listen is not None:
         listen(Progress(1, 2, 3, 4))

@@ -38,6 +38,7 @@ from nlsolve.cli.printing import (
 from nlsolve.cli.progress import Watch
 from nlsolve.contracts.status import Status
 from nlsolve.registry.problems import StudyError, did_you_mean
+from nlsolve.results.aggregates import shared_ways
 from nlsolve.results.frames import json_rows
 from nlsolve.running.diagnose import diagnose as diagnostics_of
 from nlsolve.running.forecast import ASSUMPTION, forecast
@@ -132,7 +133,7 @@ def run(
             )
     print_results(results, as_json)
     say_excluded(checked)
-    for line in (*left_out(results.runs), *results.notes):
+    for line in filter(None, (*left_out(results.runs), shared_ways(results.runs), *results.notes)):
         say(line)
     for finding in results.findings:
         say(str(finding))

@@ -11,7 +11,7 @@ differential equation are three kinds of simulation; nothing after the case know
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Generator, Mapping
+from collections.abc import Callable, Collection, Generator, Mapping
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from types import MappingProxyType
@@ -207,6 +207,12 @@ class Scene(Component, ABC):
         parts : has the component of each section as an attribute of that name.
         entry : times work outside the method, such as building operators, in the ledger of the case.
         """
+
+    def way(self, parts: Any) -> Collection[str]:
+        """The sections on which the way to the first state depends, so that cases which agree in them share it; empty
+        where there is none.
+        """
+        return ()
 
     def check(self, parts: Any) -> None:
         """Raises Misfit when components, each valid by itself, do not fit together."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from typing import Any, ClassVar
 
 import numpy as np
@@ -38,6 +38,11 @@ class FlowScene(Geometry, Scene, ABC):
     def simulation(self, parts: FlowParts, entry: Entry) -> FlowSimulation:
         """The flow of a case; `entry` times the building of its operators."""
         return FlowSimulation(parts, entry)
+
+    def way(self, parts: FlowParts) -> Collection[str]:
+        """All sections but those of the method, of increments, and of what is recorded."""
+        leads = parts.start.at != REST and (parts.time.increments or parts.start.values)
+        return ("scene", "law", "physics", "motion", "discretizer", "linear", "start") if leads else ()
 
     def check(self, parts: Any) -> None:
         """Raises Misfit when nodes move that must stay, when moving nodes are combined with convection, or when the law

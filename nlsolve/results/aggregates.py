@@ -1,4 +1,6 @@
-"""Many runs -> few cells of a table: the cheapest run within an error, how many runs there are, or the share solved."""
+"""Many runs -> few cells of a table: the cheapest run within an error, how many runs there are, or the share solved;
+and what the work has cost that several of them share.
+"""
 
 from __future__ import annotations
 
@@ -66,6 +68,23 @@ def success(runs: Sequence[Run], groups: tuple[str, ...], interval: float, form:
         text = f"{format(solved / len(members), form)} [{low}, {high}]"
         found.append({**dict(zip(groups, key, strict=True)), SOLVED: text})
     return found
+
+
+def shared_ways(runs: pd.DataFrame) -> str:
+    """What the ways to first states have cost that rows share, in a sentence; empty where none is shared."""
+    if "start_way" not in runs:
+        return ""
+    led = runs.dropna(subset="start_way")
+    shared = led[led.duplicated("start_way", keep=False)]
+    if not len(shared):
+        return ""
+    solved = shared.drop_duplicates(["start_way", "seconds_start"])
+    ways, work = shared["start_way"].nunique(), int(solved["start_factorizations"].sum())
+    each = "one way to a first state" if ways == 1 else f"{ways} ways to first states"
+    return (
+        f"{len(shared)} cases share {each}: in all {work} factorisations and {solved['seconds_start'].sum():.3g} s, "
+        "which the columns start_… and seconds_start repeat in each row"
+    )
 
 
 def grouped(runs: Sequence[Run], groups: tuple[str, ...]) -> dict[tuple[Any, ...], list[Run]]:

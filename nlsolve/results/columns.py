@@ -87,6 +87,9 @@ RUNS = _by_name(
     Column("start_factorizations", "matrices factorised on the way to the first state"),
     Column("start_triangular_solves", "pairs of triangular solves on the way to the first state"),
     Column("start_residuals", "residuals evaluated on the way to the first state"),
+    Column(
+        "start_way", "name of the way to the first state; the rows that share one were served by one solution of it"
+    ),
     Column("seconds", "time inside the method: its own work and all it asked for", "s", "time inside the method"),
     Column("seconds_factorization", "the part of `seconds` spent on factorising", "s"),
     Column("seconds_triangular_solve", "the part of `seconds` spent on triangular solves", "s"),

@@ -137,8 +137,8 @@ def run(
                 tell(turn.event(run=part.run))
     finally:
         frames = _merged(study, turns.gather())
+        turns.close()
         if store is not None:
-            store.close()
             store.write_frames(frames)
     notes = (*chosen_engine.notes, *_unfinished(len(frames.runs), len(study.cases), bool(study.expectations)))
     if store is None:

@@ -9,8 +9,10 @@ from dataclasses import replace
 from nlsolve.results.frames import Part
 from nlsolve.running.engines.engine import Listener, Turn
 from nlsolve.running.retry import is_final, lacks_something
+from nlsolve.running.store.identity import way_of
 from nlsolve.running.store.standing import rounds_of
 from nlsolve.running.store.store import Store
+from nlsolve.running.ways.ways import Ways
 from nlsolve.study.case import Case
 from nlsolve.study.study import Study
 from nlsolve.study.timing import Timing
@@ -25,6 +27,7 @@ class Turns:
 
     def __init__(self, study: Study, store: Store | None, chosen: Sequence[Case] | None = None) -> None:
         self.timing, self.store = study.timing, store
+        self.ways = Ways(study.cases, None if store is None else store.folder)
         self.parts: dict[str, Part] = {}
         cases = study.cases if chosen is None else chosen
         ours = {case.id for case in cases}
@@ -51,7 +54,7 @@ class Turns:
                     self.store.end(turn.case)
                 tell(replace(turn.event(run=self.parts[turn.case.id].run), resumed=True))
             else:
-                yield found and found[1]
+                yield found and self._on_its_way(found[1])
 
     def gather(self) -> dict[str, Part]:
         """The parts so far, and what the folder has by now of the cases that this run is not for."""
@@ -64,18 +67,32 @@ class Turns:
     def end(self, turn: Turn, again: Part) -> Part:
         """Keep the part of a turn that has ended, and give up the claim; returns the part of its case."""
         case = turn.case
+        if case.way and not lacks_something(again.run):
+            again = replace(again, run={**again.run, "start_way": way_of(case)})
         part = self.parts[case.id] = _fastest(self.parts.get(case.id), again, self.timing)
         self._ended[case.id] += 1
+        self.ways.end(case)
         if self.store is not None:
             self.store.save(case, part)
             self.store.end(case)
         return part
 
+    def close(self) -> None:
+        """Give up what this run has claimed."""
+        self.ways.close()
+        if self.store is not None:
+            self.store.close()
+
+    def _on_its_way(self, turn: Turn) -> Turn:
+        """A turn that begins, with the way to its first state where that is known."""
+        case = turn.case
+        return replace(turn, way=self.ways.begin(case), share=lambda way: self.ways.keep(case, way))
+
     def _next(self) -> tuple[int, Turn] | None:
         for _ in range(len(self._waiting)):
             number, turn = self._waiting.popleft()
             is_next = self._ended[turn.case.id] == number - 1
-            if is_next and (self._is_done(number, turn) or self._claimed(turn)):
+            if is_next and (self._is_done(number, turn) or (self.ways.is_open(turn.case) and self._claimed(turn))):
                 return number, turn
             self._waiting.append((number, turn))
         return None

@@ -14,6 +14,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
 from nlsolve.contracts.status import Status
+from nlsolve.results.aggregates import shared_ways
 from nlsolve.results.parameters import differing_parameters
 from nlsolve.results.verdicts import AT_A_SOLUTION
 
@@ -44,6 +45,7 @@ def write_report(
     page = environment.get_template("report.html").render(
         question=question,
         cases=len(runs),
+        ways=shared_ways(runs),
         endings=[{"word": word, "count": count} for word, count in runs["status"].value_counts().items()],
         tables={name: _table(table) for name, table in tables.items()},
         parameters=parameters,

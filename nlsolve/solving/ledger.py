@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import time
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 
@@ -85,6 +85,11 @@ class Ledger:
         spent.counts.subtract(before.counts)
         spent.seconds.subtract(before.seconds)
         return spent
+
+    def add(self, counts: Mapping[str, int], seconds: Mapping[str, float]) -> None:
+        """Enter work that was done elsewhere, by kind."""
+        self.counts.update(counts)
+        self.seconds.update(seconds)
 
     def counted(self) -> dict[str, int]:
         """How often each kind of work was done, by columns of `runs`."""

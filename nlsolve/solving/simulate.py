@@ -27,6 +27,7 @@ from nlsolve.solving.ledger import Ledger
 from nlsolve.solving.matrices import checked
 from nlsolve.solving.stopping import Budget, StoppingTest
 from nlsolve.solving.tangent import Tangent
+from nlsolve.solving.way import Walk, Way
 
 
 class Method(Protocol):
@@ -85,13 +86,15 @@ def run_case(
     listen: Callable[[Progress], None] | None = None,
     clock: Callable[[], float] = time.process_time,
     watch: Callable[[Simulation], None] | None = None,
+    way: Way | None = None,
+    share: Callable[[Way], None] | None = None,
 ) -> Record:
     """Run one case.
 
     parts : has the component of each section as an attribute of that name.
-    listen, clock, watch : see `simulate`.
+    listen, clock, watch, way, share : see `simulate`.
     """
-    return simulate(lambda entry: simulation_of(parts, entry), parts, listen, clock, watch)
+    return simulate(lambda entry: simulation_of(parts, entry), parts, listen, clock, watch, way, share)
 
 
 @np.errstate(all="ignore")  # what is not finite becomes a status, a doubt or a NaN
@@ -101,6 +104,8 @@ def simulate(
     listen: Callable[[Progress], None] | None = None,
     clock: Callable[[], float] = time.process_time,
     watch: Callable[[Simulation], None] | None = None,
+    way: Way | None = None,
+    share: Callable[[Way], None] | None = None,
 ) -> Record:
     """Solve the problems of a simulation. A solve that fails becomes the status of the record, not an error.
 
@@ -108,9 +113,11 @@ def simulate(
     listen : called with a `Progress` after each solve by the method of the case.
     clock : returns the seconds by which work is timed.
     watch : called with the simulation whenever it has kept a state.
+    way : the way to the first state as another case has solved it, whose outcomes are taken as far as they serve.
+    share : called with the way to the first state when it is solved, or has failed; not when it was taken whole.
     """
     nothing: Callable[[Any], None] = lambda told: None  # noqa: E731
-    return _Run(build, method, listen or nothing, clock, watch or nothing).record()
+    return _Run(build, method, listen or nothing, clock, watch or nothing, way or Way(()), share or nothing).record()
 
 
 class _Refused(Simulation):
@@ -148,12 +155,14 @@ class _Run:
         listen: Callable[[Progress], None],
         clock: Callable[[], float],
         watch: Callable[[Simulation], None],
+        way: Way,
+        share: Callable[[Way], None],
     ) -> None:
         self.method, self.listen, self.watch = method, listen, watch
-        self.ledger, self.start_ledger = Ledger(clock), Ledger(clock)
+        self.ledger = Ledger(clock)
+        self.walk = Walk(method.linear, Ledger(clock), way, share)
         self.operator = checked(method.operator)
         self.tangent = Tangent(method.linear, method.refresh, self.ledger, operator=self.operator)
-        self.start_tangent = Tangent(method.linear, None, self.start_ledger)
         self.simulation = build(self.ledger.entry)
         self.rows: list[dict[str, Any]] = []
         self.increments = self.iterations = 0
@@ -182,19 +191,14 @@ class _Run:
                     return outcome  # a simulation might try again
                 task = solves.send(outcome)
         except StopIteration as end:
+            self.walk.end()
             return end.value
         except (SolveError, CaseStopped) as error:
             return Outcome(error.status, error.detail, np.zeros(0), np.nan, ())
 
     def prepared(self, task: Solve) -> Outcome:
         """Solve a problem on the way to the first state; its work is counted apart."""
-        assert task.preparation is not None
-        stop = StoppingTest(kind="residual", tolerance=task.preparation.tolerance)
-        budget = Budget(iterations=task.preparation.iterations)
-        with self.start_ledger.entry("stage"):
-            outcome = solve(
-                task.problem, task.preparation.solver, self.start_tangent, task.start, stop, budget, self.start_ledger
-            )
+        outcome = self.walk.outcome(task)
         self.blame = outcome.blame
         if outcome.status is Status.CONVERGED:
             self.keep(task, outcome)
@@ -203,9 +207,9 @@ class _Run:
     def solved(self, task: Solve) -> Outcome:
         """Solve a problem by the method of the case; its rows, counts and largest residual are kept."""
         method, k = self.method, task.increment
+        self.walk.end()
         if not self.tangent.renewals:  # reuses the ordering of the way to the first state
-            ordered = self.start_tangent.factors
-            self.tangent = Tangent(method.linear, method.refresh, self.ledger, ordered, self.operator)
+            self.tangent = Tangent(method.linear, method.refresh, self.ledger, self.walk.ordered(), self.operator)
         outcome = solve(task.problem, method.solver, self.tangent, task.start, method.stop, method.budget, self.ledger)
         self.iterations += outcome.iterations
         self.false_convergence += outcome.claimed_wrongly
@@ -242,7 +246,7 @@ class _Run:
 
     def summary(self, outcome: Outcome) -> dict[str, Any]:
         """The row of `runs`; the simulation measures its columns on the last state that was kept."""
-        ledger, start = self.ledger, self.start_ledger
+        ledger, start = self.ledger, self.walk.ledger
         place = self.simulation.place(self.blame)
         validity = self.validity_time
         if validity is None and self.simulation.increments and self.increments:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Any
 
 from pydantic import BaseModel, ConfigDict, ValidationError, create_model
@@ -54,6 +54,8 @@ class Case:
     swept : names of the parameters that the study sweeps and that differ between its cases; `variant` stands for every
         parameter that a named setting assigns.
     reference : id of the reference case, with whose velocities this case's are compared; empty: there is none.
+    way : section -> its component, of those on which the way to the first state depends; empty: there is none.
+    way_id : digest of these components.
     """
 
     id: str
@@ -61,6 +63,8 @@ class Case:
     parameters: Mapping[str, Any]
     swept: tuple[str, ...]
     reference: str = ""
+    way: Mapping[str, Any] = field(default_factory=dict)
+    way_id: str = ""
 
     @property
     def label(self) -> str:
@@ -109,10 +113,10 @@ class Composer:
             value = getattr(getattr(parts, misfit.section), misfit.field)
             raise Invalid([Problem((misfit.section, misfit.field), _plain(value), misfit.expected)]) from misfit
         swept = {name.split(".")[0] for point in points for name in point.values}
-        telling = [name for name in sorted(known) if name != Limits.noun or name in swept]
-        canonical = ",".join(f"{json.dumps(name)}:{known[name].text}" for name in telling)
-        digest = hashlib.sha256(f"{{{canonical}}}".encode()).hexdigest()[:DIGEST_LETTERS]
-        return Case(digest, parts, *_parameters(known, points))
+        telling = [name for name in known if name != Limits.noun or name in swept]
+        way = {name: getattr(parts, name) for name in parts.scene.way(parts)}
+        parameters = _parameters(known, points)
+        return Case(_digest(known, telling), parts, *parameters, way=way, way_id=_digest(known, way) if way else "")
 
     def parts(self, document: Document) -> tuple[Mapping[str, KnownPart], type[BaseModel]]:
         """The validated part of each section, and the model of them all; a section that is left out gets its default.
@@ -251,6 +255,12 @@ def section_rows(registry: Registry) -> list[PluginRow]:
         for name, section in found.items()
         if name in askers and section.contract not in CONTRACTS.values()
     ]
+
+
+def _digest(known: Mapping[str, KnownPart], names: Iterable[str]) -> str:
+    """The digest of the components of these sections."""
+    canonical = ",".join(f"{json.dumps(name)}:{known[name].text}" for name in sorted(names))
+    return hashlib.sha256(f"{{{canonical}}}".encode()).hexdigest()[:DIGEST_LETTERS]
 
 
 def _has_kinds(section: Section) -> bool:

@@ -73,7 +73,7 @@ def test_run_without_tables_lists_endings(tmp_path):
 
 
 def test_divergence_is_a_result(tmp_path, monkeypatch):
-    def march(parts, listen, clock):
+    def march(parts, listen, clock, **way):
         record = fake_march(parts, listen)
         record.summary["status"] = "diverged"
         return record
@@ -86,7 +86,7 @@ def test_divergence_is_a_result(tmp_path, monkeypatch):
 
 
 def test_a_crash_is_1(tmp_path, monkeypatch):
-    def march(parts, listen, clock):
+    def march(parts, listen, clock, **way):
         raise RuntimeError("[oops]")
 
     monkeypatch.setattr("nlsolve.running.engines.execution.run_case", march)
@@ -98,7 +98,7 @@ def test_a_crash_is_1(tmp_path, monkeypatch):
 def test_an_interruption_is_130_and_keeps_what_is_finished(tmp_path, monkeypatch):
     count = 0
 
-    def march(parts, listen, clock):
+    def march(parts, listen, clock, **way):
         nonlocal count
         count += 1
         if count == 2:

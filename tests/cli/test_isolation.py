@@ -89,7 +89,7 @@ def test_pdb_is_called_where_the_error_is_raised(tmp_path, monkeypatch):
     debugged = []
     monkeypatch.setattr("nlsolve.cli.progress.pdb.post_mortem", debugged.append)
 
-    def march(parts, listen, clock):
+    def march(parts, listen, clock, **way):
         if parts.solver.order == 10:
             raise RuntimeError("[oops]")
         return fake_march(parts, listen)

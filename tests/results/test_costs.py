@@ -535,7 +535,7 @@ def timed(monkeypatch: pytest.MonkeyPatch) -> list[float]:
     """The seconds of the marches to come, in their order; the march itself is replaced."""
     seconds: list[float] = []
 
-    def march_of(case: Any, listen: Any, clock: Any) -> Record:
+    def march_of(case: Any, listen: Any, clock: Any, **way: Any) -> Record:
         taken = seconds.pop(0)
         if taken < 0:
             raise ZeroDivisionError

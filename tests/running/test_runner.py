@@ -49,7 +49,7 @@ def marched(monkeypatch) -> list:
     """The parts of the cases that were run; the run itself is replaced."""
     cases: list = []
 
-    def march(parts, listen, clock):
+    def march(parts, listen, clock, **way):
         cases.append(parts)
         return fake_march(parts, listen)
 
@@ -61,7 +61,7 @@ def failing_on(monkeypatch, number: int, error: BaseException) -> None:
     """The march of one case, by number from 1, raises."""
     count = 0
 
-    def march(parts, listen, clock):
+    def march(parts, listen, clock, **way):
         nonlocal count
         count += 1
         if count == number:
@@ -213,7 +213,7 @@ def test_a_case_whose_file_changes_while_it_runs_is_not_kept(tmp_path, monkeypat
     nodes = ('kind = "box"', f'kind = "box"\nnodes = {{ kind = "read", path = "{place}" }}')
     study = Study.from_toml(write_study(tmp_path, nodes), registry=registry_of(ReadingBox, *COMPONENTS[1:]))
 
-    def march(parts, listen, clock):
+    def march(parts, listen, clock, **way):
         place.write_text("new", encoding="utf-8")
         return fake_march(parts, listen)
 
@@ -240,7 +240,7 @@ def test_events(study, tmp_path):
 def test_a_case_has_one_thread(study, monkeypatch):
     seen = []
 
-    def march(parts, listen, clock):
+    def march(parts, listen, clock, **way):
         seen.extend(pool["num_threads"] for pool in threadpool_info())
         return fake_march(parts, listen)
 

@@ -181,7 +181,7 @@ from nlsolve.running import runner
 from nlsolve.running.engines import execution
 from nlsolve.study.study import Study
 
-def march(parts, listen, clock):
+def march(parts, listen, clock, **way):
     with open(sys.argv[3], "a") as file:
         print(parts.solver.order, file=file)
     time.sleep(0.02)

@@ -7,6 +7,7 @@ machine, so that it has the same limits and the same endings as here. What dask 
 from __future__ import annotations
 
 import os
+import pickle
 import secrets
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -26,7 +27,6 @@ from nlsolve.running.engines.places import origins
 from nlsolve.running.engines.processes.travel import Task, Unreadable
 from nlsolve.running.engines.side_by_side import Crew, Report, SideBySide
 from nlsolve.running.store.identity import code_of
-from nlsolve.solving.simulate import Progress
 
 SECONDS_TO_CONNECT = 10
 """Time for a scheduler to answer [s]."""
@@ -103,12 +103,12 @@ class _Hosts(Crew):
         if self._cluster is not None:
             self._cluster.close()
 
-    def _told(self, event: tuple[float, tuple[int, dict[str, int]]]) -> None:
-        """Progress, as `host.do` has sent it."""
-        _, (number, progress) = event
+    def _told(self, event: tuple[float, tuple[int, bytes]]) -> None:
+        """Progress or a way, as `host.do` has sent it."""
+        _, (number, news) = event
         given = self._given.get(number)
         if given is not None:
-            self.reports.put(Report(given[0], Progress(**progress)))
+            self.reports.put(Report(given[0], pickle.loads(news)))
 
 
 @contextmanager

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Generator, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 from nlsolve.results.frames import Part
 from nlsolve.solving.simulate import Progress
+from nlsolve.solving.way import Way
 from nlsolve.study.case import Case
 from nlsolve.study.timing import Timing
 
@@ -33,16 +34,24 @@ class Event:
 Listener = Callable[[Event], None]
 
 
+def _keep_to_itself(way: Way) -> None:
+    """Nobody waits for this way."""
+
+
 @dataclass(frozen=True)
 class Turn:
     """One run of one case.
 
     number, cases : as in an `Event`.
+    way : the way to its first state, where another case has solved it.
+    share : is to be called with that way when this case has solved it, not from another thread.
     """
 
     case: Case
     number: int
     cases: int
+    way: Way | None = None
+    share: Callable[[Way], None] = field(default=_keep_to_itself, compare=False)
 
     def event(self, progress: Progress | None = None, run: Mapping[str, Any] | None = None) -> Event:
         """What a listener is told of this turn."""

@@ -17,6 +17,7 @@ from nlsolve.running.engines.places import frames_of_error, origins, place
 from nlsolve.running.store.environment import environment_here, name_of
 from nlsolve.running.timing import CLOCKS, measure
 from nlsolve.solving.simulate import Progress, Record, crashed, run_case
+from nlsolve.solving.way import Way
 from nlsolve.study.timing import Timing
 
 Debugger = Callable[[BaseException], None]
@@ -29,16 +30,19 @@ def execute(
     timing: Timing,
     listen: Callable[[Progress], None],
     debugger: Debugger | None = None,
+    way: Way | None = None,
+    share: Callable[[Way], None] | None = None,
 ) -> Part:
     """Run one case. Every error becomes a row that says so, and so does an exit; a KeyboardInterrupt is passed on.
 
     case, parameters, parts : see `Case`.
     debugger : is called with an error of the program or of a plugin before it becomes a row.
+    way, share : see `simulate`.
     """
     try:
         with threadpool_limits(limits=1):
             clock = CLOCKS[timing.clock]
-            record = run_case(parts, listen, clock)
+            record = run_case(parts, listen, clock, way=way, share=share)
             units = unit_costs(record, parts.linear, clock) if timing.calibrate else {}
     except (Exception, SystemExit, CaseStopped) as error:  # the one boundary at which a crash turns into a result
         if debugger is not None and not isinstance(error, CaseStopped):

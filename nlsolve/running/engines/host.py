@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import os
+import pickle
 import threading
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 
 from distributed import get_worker
 
@@ -13,6 +14,7 @@ from nlsolve.results.frames import Part
 from nlsolve.running.engines.processes.keeper import Keeper
 from nlsolve.running.engines.processes.travel import Task, Unreadable
 from nlsolve.solving.simulate import Progress
+from nlsolve.solving.way import Way
 
 
 @dataclass(frozen=True)
@@ -20,7 +22,7 @@ class Assignment:
     """A task on its way to a worker of dask.
 
     known : the components of the case by their source files.
-    run : a word for the run that the task belongs to, and the topic of its progress.
+    run : a word for the run that the task belongs to, and the topic of its news.
     number : of the turn.
     folder : where the study is run; the case works there if there is such a folder.
     """
@@ -41,8 +43,8 @@ def do(assignment: Assignment) -> Part | Unreadable | None:
     """Have a case done; None when its run has been stopped. Raises InputError when no worker process can be started."""
     host = get_worker()
 
-    def tell(progress: Progress) -> None:
-        host.log_event(assignment.run, (assignment.number, asdict(progress)))
+    def tell(news: Progress | Way) -> None:
+        host.log_event(assignment.run, (assignment.number, pickle.dumps(news)))
 
     mine = (assignment.run, _keeper(assignment))
     try:

@@ -34,4 +34,5 @@ class InProcess(Engine):
 def run_here(turn: Turn, timing: Timing, tell: Listener, debugger: Debugger | None = None) -> Part:
     """The part of a turn, run in this process."""
     case = turn.case
-    return execute(case.id, case.parameters, case.parts, timing, lambda progress: tell(turn.event(progress)), debugger)
+    listen = lambda progress: tell(turn.event(progress))  # noqa: E731
+    return execute(case.id, case.parameters, case.parts, timing, listen, debugger, turn.way, turn.share)

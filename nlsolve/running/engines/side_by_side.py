@@ -14,6 +14,7 @@ from nlsolve.running.engines.engine import SECONDS_BETWEEN_LOOKS, Engine, Listen
 from nlsolve.running.engines.in_process import run_here
 from nlsolve.running.engines.processes.travel import NotPortable, Task, Unreadable, packed
 from nlsolve.solving.simulate import Progress
+from nlsolve.solving.way import Way
 from nlsolve.study.timing import Timing
 
 END = object()
@@ -21,13 +22,13 @@ END = object()
 
 @dataclass(frozen=True)
 class Report:
-    """What is told of a turn: progress, a part, why there is none, or an error that ends the run.
+    """What is told of a turn: progress, its way, a part, why there is none, or an error that ends the run.
 
     notes : sentences on what the worker lacks.
     """
 
     turn: Turn
-    what: Progress | Part | Unreadable | Exception
+    what: Progress | Way | Part | Unreadable | Exception
     notes: Sequence[str] = ()
 
 
@@ -72,7 +73,7 @@ class Crew(ABC):
             report = self.reports.get(timeout=seconds)
         except queue.Empty:
             return None
-        if not isinstance(report.what, Progress):
+        if not isinstance(report.what, Progress | Way):
             self.running -= 1
             self.free(report.turn)
         return report
@@ -100,7 +101,7 @@ class SideBySide(Engine):
                     else:
                         tell(turn.event())
                         try:
-                            crew.give(turn, packed(turn.case, timing))
+                            crew.give(turn, packed(turn.case, timing, turn.way))
                         except NotPortable as reason:
                             yield turn, self._here(turn, timing, tell, str(reason))
                 report = crew.report(SECONDS_BETWEEN_LOOKS if held else None)
@@ -110,7 +111,9 @@ class SideBySide(Engine):
                     self.note(sentence)
                 if isinstance(report.what, Exception):
                     raise report.what
-                if isinstance(report.what, Progress):
+                if isinstance(report.what, Way):
+                    report.turn.share(report.what)
+                elif isinstance(report.what, Progress):
                     tell(report.turn.event(report.what))
                 elif isinstance(report.what, Unreadable):
                     yield report.turn, self._here(report.turn, timing, tell, report.what.reason)

@@ -6,7 +6,7 @@ Names of tables and settings, the question, the order of sweeps and the other ca
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -61,10 +61,20 @@ def case_of(key: str) -> str:
 
 def identity_of(case: Case) -> Identity:
     """The identity of a case as it would be run now."""
+    return _identity(case.id, [value for _, value in case.parts])
+
+
+def way_of(case: Case) -> str:
+    """The name of a case's way to its first state; cases of one name share it. Empty: it has none."""
+    return _identity(case.way_id, case.way.values()).key if case.way else ""
+
+
+def _identity(name: str, sections: Collection[Any]) -> Identity:
     files: dict[str, str] = {}
-    for value in _models(case.parts):
-        files |= {str(path): _content(path) for path in files_read(value)}
-    return Identity(case.id, code_of(value for _, value in case.parts), dict(sorted(files.items())))
+    for section in sections:
+        for value in _inside(section):
+            files |= {str(path): _content(path) for path in files_read(value)}
+    return Identity(name, code_of(sections), dict(sorted(files.items())))
 
 
 def code_of(sections: Iterable[Any]) -> dict[str, str]:

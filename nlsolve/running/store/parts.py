@@ -34,8 +34,8 @@ from nlsolve.results.verdicts import status_of
 from nlsolve.running.store.environment import name_of
 from nlsolve.running.store.identity import Identity
 
-CASES, ENVIRONMENTS = "cases", "environments"
-"""Names of the folders of parts and of environments."""
+CASES, ENVIRONMENTS, WAYS = "cases", "environments", "ways"
+"""Names of the folders of parts, of environments and of ways to first states (`nlsolve.running.ways`)."""
 
 OLD_PART = ".runs.parquet"
 """How the name of a part ended before parts knew their source."""

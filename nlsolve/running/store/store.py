@@ -23,6 +23,7 @@ from nlsolve.running.store.identity import Identity, identity_of
 from nlsolve.running.store.parts import (
     CASES,
     ENVIRONMENTS,
+    WAYS,
     Parts,
     StoreError,
     merge,
@@ -125,7 +126,7 @@ class Store:
         """Remember by what the tables, figures and report were made that are there now."""
         entries = [self.parts.entry(self._begun[case.id].key) for case in self.study.cases]
         files = [path.relative_to(self.folder) for path in self.folder.rglob("*") if path.is_file()]
-        shown = [str(path) for path in files if path.parts[0] not in (CASES, ENVIRONMENTS, CLAIMS, SHOWN)]
+        shown = [str(path) for path in files if path.parts[0] not in (CASES, ENVIRONMENTS, WAYS, CLAIMS, SHOWN)]
         digest = shown_of(self.study, [entry for entry in entries if entry is not None])
         document = {"digest": digest, "files": sorted(shown), "notes": list(notes)}
         self.write_text(SHOWN, json.dumps(document, ensure_ascii=False) + "\n")

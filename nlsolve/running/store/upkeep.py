@@ -13,7 +13,17 @@ from nlsolve.results.verdicts import status_of
 from nlsolve.running.retry import TRIED_AGAIN
 from nlsolve.running.store.claims import CLAIMS, LOCK, claimed
 from nlsolve.running.store.identity import case_of, identity_of
-from nlsolve.running.store.parts import CASES, ENVIRONMENTS, PARTIAL, Entry, Parts, StoreError, replacing, writing
+from nlsolve.running.store.parts import (
+    CASES,
+    ENVIRONMENTS,
+    PARTIAL,
+    WAYS,
+    Entry,
+    Parts,
+    StoreError,
+    replacing,
+    writing,
+)
 from nlsolve.running.store.reading import STUDY, description_of, is_results_folder
 from nlsolve.study.study import Study
 
@@ -91,7 +101,7 @@ def superfluous(folder: Path, others: bool = False) -> list[Path]:
     """The files of a results folder that nothing needs; with `others`, those of other studies' cases as well.
 
     They are parts that are damaged, or that a later part of the same case has taken the place of; frames without a
-    part; environments without a row; and what killed runs have left, unless a run is at work now.
+    part; environments and ways without a row; and what killed runs have left, unless a run is at work now.
     Raises StoreError when this is no results folder, or `others` is asked for and its study cannot be read.
     """
     if not is_results_folder(folder):
@@ -109,10 +119,13 @@ def superfluous(folder: Path, others: bool = False) -> list[Path]:
     needed = {key for key in entries if key in planned or (not others and last[case_of(key)] == key)}
     running = set(claimed(folder))
     used = {f"{entries[key].measured.get('environment')}.json" for key in needed}
+    ways = {entries[key].measured.get("start_way") for key in needed}
     found = [path for path in (folder / CASES).iterdir() if path.name.split(".")[0] not in needed | running]
     if not running:
         found += folder.rglob(f".*{PARTIAL}")
-        found += (folder / CLAIMS).glob(f"*{LOCK}")
+        for locks in (folder / CLAIMS, folder / WAYS / CLAIMS):
+            found += locks.glob(f"*{LOCK}")
+        found += (path for path in (folder / WAYS).glob("*.npz") if path.stem not in ways)
         found += (path for path in (folder / ENVIRONMENTS).glob("*.json") if path.name not in used)
     return sorted({path for path in found if path.is_file() and (not running or not path.name.startswith("."))})
 
@@ -158,7 +171,9 @@ def export(study: Study, text: str, options: str, folder: Path, to: Path) -> lis
 def _results_of(folder: Path, entries: Mapping[str, Entry], environments: Iterable[str]) -> list[Path]:
     """The files of a results folder that belong to these parts, and what is shown of the study."""
     shown = [
-        path for path in folder.rglob("*") if path.relative_to(folder).parts[0] not in (CASES, ENVIRONMENTS, CLAIMS)
+        path
+        for path in folder.rglob("*")
+        if path.relative_to(folder).parts[0] not in (CASES, ENVIRONMENTS, WAYS, CLAIMS)
     ]
     kept = [folder / CASES / f"{key}{suffix}" for key in entries for suffix in (".json", ".txt")]
     kept += [folder / CASES / f"{key}.{name}.parquet" for key, entry in entries.items() for name in entry.frames]

@@ -43,7 +43,7 @@ def marched(monkeypatch) -> list[Any]:
     """The parts of the cases that were run; the run itself is replaced."""
     cases: list[Any] = []
 
-    def march(parts: Any, listen: Any, clock: Any) -> Any:
+    def march(parts: Any, listen: Any, clock: Any, **way: Any) -> Any:
         cases.append(parts)
         return fake_march(parts, listen)
 

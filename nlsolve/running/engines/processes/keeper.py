@@ -16,6 +16,7 @@ from nlsolve.running.engines.processes.process import WorkerProcess
 from nlsolve.running.engines.processes.travel import Ended, Ready, Task, Unreadable
 from nlsolve.running.engines.processes.worker import PLACE_SIGNAL, SIGNALS, limit_of
 from nlsolve.solving.simulate import Progress
+from nlsolve.solving.way import Way
 
 TICK = 0.1
 """How often the limits of a case are looked at [s]."""
@@ -48,7 +49,9 @@ class Keeper:
         self.worker: WorkerProcess | None = None
         self.ending = threading.Event()
 
-    def done(self, task: Task, known: Mapping[str, str], tell: Callable[[Progress], None]) -> Part | Unreadable | None:
+    def done(
+        self, task: Task, known: Mapping[str, str], tell: Callable[[Progress | Way], None]
+    ) -> Part | Unreadable | None:
         """The part of a task; once more where something from outside has killed the process. None when ending.
 
         known : the components of the case by their source files; see `origins`.
@@ -89,14 +92,14 @@ class Keeper:
         return None
 
     def _watched(
-        self, worker: WorkerProcess, task: Task, known: Mapping[str, str], tell: Callable[[Progress], None]
+        self, worker: WorkerProcess, task: Task, known: Mapping[str, str], tell: Callable[[Progress | Way], None]
     ) -> Part | Unreadable | None:
         """The answer of a worker, or the part of a case that was killed at a limit; None when the worker has died."""
         begun = looked = _now()
         stopped, stopped_at = None, 0.0
         while not self.ending.is_set():
             answer = worker.answer(TICK)
-            if isinstance(answer, Progress):
+            if isinstance(answer, Progress | Way):
                 tell(answer)
             elif isinstance(answer, Unreadable):
                 return answer

@@ -15,6 +15,7 @@ from nlsolve.contracts.component import Component
 from nlsolve.results.frames import Part
 from nlsolve.running.engines.places import components_in, named
 from nlsolve.running.store.identity import code_of
+from nlsolve.solving.way import Way
 from nlsolve.study.case import Case
 from nlsolve.study.limits import Limits
 from nlsolve.study.timing import Timing
@@ -37,6 +38,7 @@ class Task:
 
     sections : each component, pickled by itself, so that the one that fails can be named.
     files : module -> its file, for the modules of the components, which need not be installed.
+    way : the way to its first state, where another case has solved it.
     code : package -> version and fingerprint of its source, as `code_of` the components, where they must be the same.
     """
 
@@ -46,6 +48,7 @@ class Task:
     files: Mapping[str, str]
     limits: Limits
     timing: Timing
+    way: Way | None = None
     code: Mapping[str, str] = field(default_factory=dict)
 
     def parts(self) -> Sections:
@@ -88,13 +91,13 @@ class Unreadable:
     reason: str
 
 
-def packed(case: Case, timing: Timing) -> Task:
+def packed(case: Case, timing: Timing, way: Way | None = None) -> Task:
     """The task of a case. Raises NotPortable when a component cannot be pickled, or is of the running script's own."""
     sections = {name: _packed(name, value) for name, value in case.parts}
     modules = {type(component).__module__ for component in components_in(value for _, value in case.parts)}
     files = {name: getattr(sys.modules.get(name), "__file__", None) for name in sorted(modules)}
     known = {name: file for name, file in files.items() if file is not None}
-    return Task(case.id, dict(case.parameters), sections, known, case.parts.limits, timing)
+    return Task(case.id, dict(case.parameters), sections, known, case.parts.limits, timing, way)
 
 
 class _Pickler(pickle.Pickler):

@@ -95,7 +95,9 @@ class Worker:
             _allow(task.limits.bytes)
             parts = task.parts()
             self.origins = origins(parts)
-            part = execute(task.case, task.parameters, parts, task.timing, self.listen)
+            part = execute(
+                task.case, task.parameters, parts, task.timing, self.listen, way=task.way, share=self.connection.send
+            )
         except NotPortable as reason:
             return Unreadable(str(reason))
         except BaseException as error:  # also a KeyboardInterrupt, which is nobody's at a keyboard

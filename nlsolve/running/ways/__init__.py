@@ -1,0 +1,1 @@
+"""The ways to first states: which cases of a run share one, and where they are kept."""
