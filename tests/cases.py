@@ -36,9 +36,9 @@ from nlsolve.plugin import (
 )
 from nlsolve.series import Array
 from nlsolve.solving.driver import solve
-from nlsolve.solving.ledger import Ledger
 from nlsolve.solving.stopping import Budget, StoppingTest
 from nlsolve.solving.tangent import Tangent
+from nlsolve.solving.work.ledger import Ledger
 
 LAWS: dict[str, ConstitutiveLaw] = {
     law.kind_name(): law

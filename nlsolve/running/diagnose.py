@@ -9,8 +9,8 @@ import pandas as pd
 from nlsolve.contracts.status import SolveError
 from nlsolve.results.columns import DIAGNOSTICS
 from nlsolve.results.parameters import names_settings
-from nlsolve.solving.ledger import Ledger
 from nlsolve.solving.simulate import simulation_of
+from nlsolve.solving.work.ledger import Ledger
 from nlsolve.study.study import Study
 
 NO_CLOUD = "this scene has no cloud, and no operators on it"

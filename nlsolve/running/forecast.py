@@ -10,8 +10,8 @@ import pandas as pd
 from nlsolve.contracts.component import Component
 from nlsolve.registry.component_tables import class_name
 from nlsolve.running.timing import calibrate
-from nlsolve.solving.ledger import Ledger
 from nlsolve.solving.simulate import simulation_of
+from nlsolve.solving.work.ledger import Ledger
 from nlsolve.study.study import Study
 
 SOLVES = 20

@@ -24,8 +24,8 @@ from nlsolve.contracts.problem import Expansion, NonlinearProblem
 from nlsolve.contracts.status import SolveError
 from nlsolve.results.costs.unit_costs import UnitCosts
 from nlsolve.series import Array
-from nlsolve.solving.ledger import Ledger
 from nlsolve.solving.simulate import simulation_of
+from nlsolve.solving.work.ledger import Ledger
 
 ROUNDS = 5
 """How often all kinds of work are timed in turn."""

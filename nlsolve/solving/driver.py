@@ -13,11 +13,11 @@ from nlsolve.contracts.problem import NonlinearProblem
 from nlsolve.contracts.status import CaseStopped, SolveError, Status
 from nlsolve.results.columns import step_columns
 from nlsolve.series import Array, NoSeries
-from nlsolve.solving.counted_matrix import plain
-from nlsolve.solving.counted_problem import CountedProblem
-from nlsolve.solving.ledger import Ledger
 from nlsolve.solving.stopping import Budget, StoppingTest
 from nlsolve.solving.tangent import Tangent
+from nlsolve.solving.work.counted_matrix import plain
+from nlsolve.solving.work.counted_problem import CountedProblem
+from nlsolve.solving.work.ledger import Ledger
 
 GROWTH_OF_DIVERGENCE = 1e6  # residual over the larger of its first value and its scale
 ROUNDING = 4.0 * float(np.finfo(float).eps)  # of ‖R‖ over the size of the terms of J u, where R counts as zero

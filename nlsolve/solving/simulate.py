@@ -23,11 +23,11 @@ from nlsolve.results.columns import REPORTED, run_columns
 from nlsolve.results.frames import steps_frame
 from nlsolve.series import Array
 from nlsolve.solving.driver import solve
-from nlsolve.solving.ledger import Ledger
 from nlsolve.solving.matrices import checked
 from nlsolve.solving.stopping import Budget, StoppingTest
 from nlsolve.solving.tangent import Tangent
 from nlsolve.solving.way import Walk, Way
+from nlsolve.solving.work.ledger import Ledger
 
 
 class Method(Protocol):

@@ -13,9 +13,9 @@ from nlsolve.contracts.nonlinear_solver import KeptTangent
 from nlsolve.contracts.rules.refresh import RefreshRule, TangentHistory
 from nlsolve.contracts.status import SolveError, Status
 from nlsolve.series import Array
-from nlsolve.solving.counted_matrix import CountedMatrix, counted, plain
-from nlsolve.solving.ledger import Ledger
 from nlsolve.solving.matrices import CheckedOperator, why_singular
+from nlsolve.solving.work.counted_matrix import CountedMatrix, counted, plain
+from nlsolve.solving.work.ledger import Ledger
 
 SMALLEST = 1e-16  # a smaller contraction is rounding, and counts as this one
 WAY_OUT = "choose the solver robust, which gets away from such a state, or another start"

@@ -20,9 +20,9 @@ from nlsolve.contracts.scene import Preparation, Solve
 from nlsolve.contracts.status import STOPPED, SolveError, Status
 from nlsolve.series import Array
 from nlsolve.solving.driver import solve
-from nlsolve.solving.ledger import Ledger
 from nlsolve.solving.stopping import Budget, StoppingTest
 from nlsolve.solving.tangent import Tangent
+from nlsolve.solving.work.ledger import Ledger
 
 ROUNDING = 2.0
 """Growth of a recorded residual that rounding explains on another machine."""

@@ -15,9 +15,9 @@ from nlsolve.contracts.rules.range_rule import RangeRule
 from nlsolve.contracts.rules.refresh import RefreshRule, TangentHistory
 from nlsolve.contracts.status import SolveError
 from nlsolve.series import Array
-from nlsolve.solving.ledger import Ledger
 from nlsolve.solving.matrices import CheckedOperator
 from nlsolve.solving.tangent import Tangent
+from nlsolve.solving.work.ledger import Ledger
 from nlsolve.testing.promises import norm, require, same
 from nlsolve.testing.toy_problem import DenseLU, ToyProblem
 

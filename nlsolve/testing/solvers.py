@@ -15,10 +15,10 @@ from nlsolve.contracts.rules.refresh import RefreshRule
 from nlsolve.contracts.status import Status
 from nlsolve.series import Array
 from nlsolve.solving.driver import solve
-from nlsolve.solving.ledger import Ledger
 from nlsolve.solving.matrices import CheckedOperator
 from nlsolve.solving.stopping import Budget, StoppingTest
 from nlsolve.solving.tangent import Tangent
+from nlsolve.solving.work.ledger import Ledger
 from nlsolve.testing.promises import require, same
 from nlsolve.testing.toy_problem import DenseLU, ToyProblem
 

@@ -31,9 +31,9 @@ from nlsolve.results.columns import RUNS, STEPS
 from nlsolve.results.verdicts import DOUBTED, RIGHT, outcome, solved
 from nlsolve.running.diagnose import diagnose
 from nlsolve.running.forecast import forecast
-from nlsolve.solving.ledger import Ledger
 from nlsolve.solving.simulate import Record, run_case
 from nlsolve.solving.stopping import Budget, StoppingTest
+from nlsolve.solving.work.ledger import Ledger
 from nlsolve.study.study import Study
 from nlsolve.testing import check_solver, check_system
 

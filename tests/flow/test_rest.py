@@ -26,9 +26,9 @@ from nlsolve.flow.march import FlowSimulation
 from nlsolve.flow.momentum import Flow
 from nlsolve.plugin import NodeMotion, Physics, Recording, TimeSteps
 from nlsolve.running.forecast import forecast
-from nlsolve.solving.ledger import Ledger
 from nlsolve.solving.simulate import Progress, Record, run_case
 from nlsolve.solving.stopping import Budget, StoppingTest
+from nlsolve.solving.work.ledger import Ledger
 
 DT = 1e-4
 SPEED = 150.0  # of the tool's wall [mm/s]

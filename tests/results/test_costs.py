@@ -36,9 +36,9 @@ from nlsolve.running.timing import ORDER, calibrate, measure
 from nlsolve.show.figures import BaseFigure, FigureError, FigureSpec, draw
 from nlsolve.show.figures.style import ACCENT
 from nlsolve.show.tables import TableSpec, build
-from nlsolve.solving.ledger import Ledger
 from nlsolve.solving.simulate import Record
 from nlsolve.solving.simulate import run_case as march
+from nlsolve.solving.work.ledger import Ledger
 from nlsolve.study.study import Study
 from nlsolve.testing.toy_problem import ToyProblem
 

@@ -15,8 +15,8 @@ from nlsolve_solvers.homotopy import AsymptoticNumericalMethod
 
 from nlsolve import Status
 from nlsolve.plugin import KeptTangent, NonlinearProblem, NonlinearSolver, RefreshRule, Step, TangentHistory
-from nlsolve.solving.ledger import Ledger
 from nlsolve.solving.tangent import Tangent
+from nlsolve.solving.work.ledger import Ledger
 from nlsolve.testing import check_solver
 from nlsolve.testing.toy_problem import DenseLU, ToyProblem
 

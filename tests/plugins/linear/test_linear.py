@@ -26,9 +26,9 @@ from nlsolve_solvers.modified_newton import ModifiedNewton
 
 from nlsolve import SolveError, Status
 from nlsolve.plugin import Factors, LinearSolver
-from nlsolve.solving.ledger import Ledger
 from nlsolve.solving.stopping import StoppingTest
 from nlsolve.solving.tangent import Tangent
+from nlsolve.solving.work.ledger import Ledger
 from nlsolve.testing import check_linear_solver
 from nlsolve.testing.toy_problem import ToyProblem
 

@@ -22,12 +22,12 @@ from nlsolve.flow.continuation import Start
 from nlsolve.flow.momentum import Flow
 from nlsolve.plugin import Discretizer, Physics
 from nlsolve.series import Array
-from nlsolve.solving.counted_problem import CountedProblem
 from nlsolve.solving.driver import solve
-from nlsolve.solving.ledger import Ledger
 from nlsolve.solving.simulate import run_case as march
 from nlsolve.solving.stopping import Budget, StoppingTest
 from nlsolve.solving.tangent import Tangent
+from nlsolve.solving.work.counted_problem import CountedProblem
+from nlsolve.solving.work.ledger import Ledger
 from nlsolve.testing import check_solver
 from nlsolve.testing.toy_problem import ToyProblem
 

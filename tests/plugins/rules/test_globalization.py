@@ -24,11 +24,11 @@ from nlsolve.plugin import Globalization
 from nlsolve.registry.problems import StudyError
 from nlsolve.registry.registry import Registry, load_registry
 from nlsolve.series import Array
-from nlsolve.solving.counted_problem import CountedProblem
 from nlsolve.solving.driver import solve
-from nlsolve.solving.ledger import Ledger
 from nlsolve.solving.stopping import Budget, StoppingTest
 from nlsolve.solving.tangent import Tangent
+from nlsolve.solving.work.counted_problem import CountedProblem
+from nlsolve.solving.work.ledger import Ledger
 from nlsolve.testing import check_globalization
 from nlsolve.testing.toy_problem import DenseLU, ToyProblem
 

@@ -57,13 +57,13 @@ from nlsolve.plugin import (
     Series,
     TimeSteps,
 )
-from nlsolve.solving.counted_problem import CountedProblem
 from nlsolve.solving.driver import solve
-from nlsolve.solving.ledger import Ledger
 from nlsolve.solving.matrices import CheckedOperator, checked
 from nlsolve.solving.simulate import run_case
 from nlsolve.solving.stopping import Budget, StoppingTest
 from nlsolve.solving.tangent import Tangent
+from nlsolve.solving.work.counted_problem import CountedProblem
+from nlsolve.solving.work.ledger import Ledger
 from nlsolve.testing import check_operator
 from nlsolve.testing.toy_problem import DenseLU, ToyProblem
 

@@ -21,11 +21,11 @@ from nlsolve import SolveError, Status
 from nlsolve.contracts.outcome import Outcome
 from nlsolve.plugin import NonlinearSolver, RefreshRule
 from nlsolve.results.columns import REPORTED
-from nlsolve.solving.counted_problem import CountedProblem
 from nlsolve.solving.driver import solve
-from nlsolve.solving.ledger import Ledger
 from nlsolve.solving.stopping import Budget, StoppingTest
 from nlsolve.solving.tangent import Tangent
+from nlsolve.solving.work.counted_problem import CountedProblem
+from nlsolve.solving.work.ledger import Ledger
 from nlsolve.testing import check_solver
 from nlsolve.testing.toy_problem import DenseLU, ToyProblem
 

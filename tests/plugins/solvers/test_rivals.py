@@ -38,10 +38,10 @@ from nlsolve import SolveError, Status
 from nlsolve.flow.convection import Convection
 from nlsolve.flow.momentum import Flow
 from nlsolve.plugin import Mixing, NonlinearProblem, NonlinearSolver, RefreshRule, TangentHistory
-from nlsolve.solving.counted_problem import CountedProblem
-from nlsolve.solving.ledger import Ledger
 from nlsolve.solving.stopping import StoppingTest
 from nlsolve.solving.tangent import Tangent
+from nlsolve.solving.work.counted_problem import CountedProblem
+from nlsolve.solving.work.ledger import Ledger
 from nlsolve.testing import check_refresh_rule, check_solver
 from nlsolve.testing.toy_problem import DenseLU, ToyProblem
 

@@ -16,10 +16,10 @@ from pydantic import ValidationError
 from nlsolve import Outcome, Status
 from nlsolve.plugin import NodeMotion, RefreshRule, TimeSteps
 from nlsolve.solving.driver import solve
-from nlsolve.solving.ledger import Ledger
 from nlsolve.solving.simulate import run_case as march
 from nlsolve.solving.stopping import Budget, StoppingTest
 from nlsolve.solving.tangent import Tangent
+from nlsolve.solving.work.ledger import Ledger
 from nlsolve.testing.toy_problem import DenseLU, ToyProblem
 
 Method = AsymptoticNumericalMethod

@@ -16,10 +16,10 @@ from pydantic import ValidationError
 
 from nlsolve import Status
 from nlsolve.plugin import NonlinearSolver, RefreshRule, TangentHistory
-from nlsolve.solving.counted_problem import CountedProblem
-from nlsolve.solving.ledger import Ledger
 from nlsolve.solving.stopping import StoppingTest
 from nlsolve.solving.tangent import Tangent
+from nlsolve.solving.work.counted_problem import CountedProblem
+from nlsolve.solving.work.ledger import Ledger
 from nlsolve.testing import check_linear_solver, check_refresh_rule, check_solver
 from nlsolve.testing.toy_problem import DenseLU, ToyProblem
 

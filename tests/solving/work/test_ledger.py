@@ -16,9 +16,9 @@ from nlsolve_solvers.modified_newton import ModifiedNewton
 
 from nlsolve import Status
 from nlsolve.plugin import KeptTangent, NonlinearProblem, NonlinearSolver, Step
-from nlsolve.solving.counted_problem import CountedProblem
-from nlsolve.solving.ledger import Ledger
 from nlsolve.solving.stopping import StoppingTest
+from nlsolve.solving.work.counted_problem import CountedProblem
+from nlsolve.solving.work.ledger import Ledger
 from nlsolve.testing.toy_problem import DenseLU, ToyProblem
 
 START = ToyProblem.solution + 0.5 * np.cos(np.arange(12.0))

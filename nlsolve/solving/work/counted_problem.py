@@ -11,9 +11,9 @@ import numpy as np
 from nlsolve.contracts.problem import Expansion, NonlinearProblem
 from nlsolve.contracts.status import SolveError, Status
 from nlsolve.series import Array, NoSeries, NoSeriesHere
-from nlsolve.solving.counted_matrix import CountedMatrix, counted
-from nlsolve.solving.ledger import Ledger
 from nlsolve.solving.matrices import CheckedOperator
+from nlsolve.solving.work.counted_matrix import CountedMatrix, counted
+from nlsolve.solving.work.ledger import Ledger
 
 
 @contextmanager

@@ -10,9 +10,9 @@ import scipy.sparse as sp
 
 from nlsolve import SolveError, Status
 from nlsolve.plugin import Expansion, NonlinearProblem, Series, cached_jacobian
-from nlsolve.solving.counted_matrix import CountedMatrix
-from nlsolve.solving.counted_problem import CountedProblem
-from nlsolve.solving.ledger import Ledger
+from nlsolve.solving.work.counted_matrix import CountedMatrix
+from nlsolve.solving.work.counted_problem import CountedProblem
+from nlsolve.solving.work.ledger import Ledger
 from nlsolve.testing import check_problem
 from nlsolve.testing.toy_problem import ToyProblem
 

@@ -8,7 +8,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from nlsolve.series import Array
-from nlsolve.solving.ledger import Ledger
+from nlsolve.solving.work.ledger import Ledger
 
 
 class CountedMatrix:
