@@ -13,6 +13,7 @@ from nlsolve.contracts.outcome import Outcome
 from nlsolve.contracts.problem import NonlinearProblem
 from nlsolve.contracts.scene import Entry, Simulation, Solve, Workload
 from nlsolve.contracts.status import SolveError, Status
+from nlsolve.flow.accuracy.estimate import error_estimate
 from nlsolve.flow.continuation import REST, Solves, Stage, walk
 from nlsolve.flow.incompressibility import iterate_pressure
 from nlsolve.flow.momentum import Flow
@@ -197,7 +198,7 @@ class FlowSimulation(Simulation):
 
         def estimate() -> float:
             solved = outcome.status is Status.CONVERGED
-            return state.error_estimate(velocity, self.before) if solved else float("nan")
+            return error_estimate(state, velocity, self.before) if solved else float("nan")
 
         return found | audit(parts, flow, velocity, change, time, estimate)
 

@@ -10,8 +10,6 @@ from nlsolve.contracts.continuum.discretizer import Discretizer
 from nlsolve.contracts.continuum.geometry import Geometry
 from nlsolve.contracts.continuum.law import rate_squared
 from nlsolve.contracts.continuum.terms import NodeMotion
-from nlsolve.contracts.linear_solver import LinearSolver
-from nlsolve.contracts.status import SolveError, Status
 from nlsolve.flow.momentum import Flow
 from nlsolve.series import Array
 
@@ -30,23 +28,6 @@ def velocity_error(scene: Geometry, flow: Flow, velocity: Array, time: float) ->
 
 def _relative(value: Array, exact: Array) -> float:
     return float(np.linalg.norm(value - exact) / np.linalg.norm(exact))
-
-
-def discretization_error(other: Flow, velocity: Array, linear: LinearSolver) -> float:
-    """‖δ‖₂/‖v‖₂ with J′(v) δ = −R′(v), over the interior nodes: how far a solved `velocity` (N, 2) [mm/s] is from that
-    of `other`, R′, another discretisation of the same flow on the same nodes.
-
-    When the errors of the two have little in common, δ is mainly the larger of them. One Newton step estimates it, as
-    in defect correction (Stetter 1978; Skeel 1986): R′ = 0 is never solved.
-
-    Raises SolveError when `other` has no finite residual or a singular tangent at `velocity`.
-    """
-    u = other.unknowns(velocity)
-    residual = other.residual(u)
-    if not np.isfinite(residual).all():
-        raise SolveError(Status.NON_FINITE, "the residual of the other discretisation is not finite")
-    change = linear.factorize(other.jacobian(u)).solve(residual)
-    return float(np.linalg.norm(change) / np.linalg.norm(u))
 
 
 def divergence(flow: Flow, velocity: Array) -> float:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from copy import copy
 from typing import Any, Protocol
 
 import numpy as np
@@ -15,12 +16,12 @@ from nlsolve.contracts.continuum.terms import NodeMotion, Physics, Recording, Ti
 from nlsolve.contracts.linear_solver import LinearSolver
 from nlsolve.contracts.rules.predictor import Predictor
 from nlsolve.contracts.scene import Entry
+from nlsolve.flow.accuracy.enrichment import Enriched
 from nlsolve.flow.continuation import Start
 from nlsolve.flow.convection import Convection
 from nlsolve.flow.momentum import Flow, Inertia
 from nlsolve.flow.motion.moving_nodes import MovingNodes
 from nlsolve.flow.motion.point_rates import Passage, PointRates
-from nlsolve.flow.observables import discretization_error
 from nlsolve.series import Array
 from nlsolve.solving.stopping import Budget
 
@@ -135,19 +136,13 @@ class FlowState:
         law: ConstitutiveLaw,
         inertia: Inertia | None = None,
         load: float = 1.0,
-        others: Operators | None = None,
     ) -> Flow:
         """The problem R(u) = 0 at the present time.
 
         inertia : None without inertia.
         load : factor on boundary velocities and body forces.
-        others : operators of the same cloud by another discretizer, instead of those of the march.
         """
-        operators = others or self.operators
-        pressure = self.pressure
-        if others is not None and pressure is not None:
-            pressure = self.between_volume_points(self.operators, others) @ pressure
-        physics = self.parts.physics
+        operators, physics = self.operators, self.parts.physics
         body_force = self.scene.body_force(self.cloud.nodes[self.cloud.interior], law, physics)
         modulus: float | Array = 0.0
         if self.volumetric:
@@ -159,19 +154,31 @@ class FlowState:
             law,
             load * self.scene.boundary_velocity(self.cloud, law, self.time),
             modulus,
-            pressure,
+            self.pressure,
             inertia,
             Convection(physics.density, self.gradient) if self.gradient is not None else None,
             None if body_force is None else load * body_force,
             self.scene.reference_rate,
-            self.drift_at(operators),
+            self.drift,
         )
 
-    def drift_at(self, operators: Operators) -> PointRates | None:
-        """The drift at the points of the present cloud's operators, which may be another discretizer's."""
-        if self.drift is None or operators is self.operators:
-            return self.drift
-        return self.drift.at(*self._passage(self.cloud, self.operators, operators))
+    def enriched(self, finer: Enriched, discretizer: Discretizer, velocity: Array) -> FlowState:
+        """This flow, solved last with `velocity` (N, 2), on a finer cloud by a discretizer that may be another one.
+
+        The pressure there is the one that the penalty has built up here. May raise SolveError (bad cloud).
+        """
+        assert self.flow is not None
+        there = copy(self)
+        there.cloud, there.moving = finer.cloud, None
+        there.velocity = there.guess = finer.carry(velocity)
+        there.operators = discretizer.operators(finer.cloud, self.volumetric)
+        there.gradient = None if self.gradient is None else discretizer.gradient(finer.cloud)
+        pressure = self.flow.pressure(self.flow.unknowns(velocity))
+        if pressure is not None:
+            there.pressure = self.between_volume_points(self.operators, there.operators) @ pressure
+        if self.drift is not None:
+            there.drift = self.drift.at(*self._passage(self.cloud, self.operators, there.operators))
+        return there
 
     def rate_squared_at_volume_points(self, operators: Operators) -> Array:
         """ε̄² of the velocity so far, taken at the strain point nearest to each volume point, shape (L,)."""
@@ -189,13 +196,3 @@ class FlowState:
         """Keep a problem with its solution (2F,), which is measured and which the next solve begins with."""
         self.flow, self.unknowns = flow, unknowns
         self.velocity = self.guess = flow.velocity(unknowns)
-
-    def error_estimate(self, velocity: Array, before: Array | None) -> float:
-        """Relative error of the `velocity` (N, 2) at the end of an increment that began with `before` (N, 2), by the
-        error estimator; NaN without one. May raise SolveError.
-        """
-        if self.parts.error_estimator is None:
-            return float("nan")
-        others = self.parts.error_estimator.operators(self.cloud, self.volumetric)
-        flow = self.flow_of(self.parts.law, self.inertia_from(before), others=others)
-        return discretization_error(flow, velocity, self.parts.linear)

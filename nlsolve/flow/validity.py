@@ -1,7 +1,7 @@
 """How large is what a scene left out? Every missing term, estimated from the solution itself.
 
     ρ ∂V/∂t, ρ (V·∇) V beside ∇S      div V beside ε̄      ε₀ beside ε̄      h ∇∇V beside ∇V      S:ε̇/(ρ c_p) beside T
-    V beside the V of another discretisation
+    V beside the V of an enriched cloud
 
 N nodes, M strain points. An audit above its limit names the switch to turn on. A term that the scene keeps has no
 audit (NaN). Every audit above its limit puts the result in doubt, except that of heating.
@@ -68,7 +68,7 @@ LIMITS: dict[str, Limit] = {
     "audit.resolution": Limit(1 / 3, "the nodes are too far apart for the layers: choose a finer spacing there"),
     "velocity_error_estimate": Limit(
         ACCEPTED / SAFETY,
-        "another discretization of the same nodes disagrees: choose a finer or evener spacing, or the other one",
+        "a solution with more nodes differs: choose a finer or evener spacing, or a higher penalty",
     ),
     "audit.heating": Limit(50.0, "temperature is constant here: the material would heat up and soften", doubt=False),
 }
@@ -92,9 +92,13 @@ def audit(
     try:
         gradient = parts.discretizer.gradient(flow.cloud)
         to_nodes = parts.discretizer.values(flow.operators.strain.points, flow.cloud.nodes)
-        error = estimate()
     except SolveError as refusal:
         return {"doubt": f"the audits could not be made: {refusal.detail}"}
+    error, doubts = float("nan"), []
+    try:
+        error = estimate()
+    except SolveError as refusal:
+        doubts.append(f"the error could not be estimated: {refusal.detail}")
     strain_rate = flow.strain_rate(flow.unknowns(velocity))
     slopes = np.stack([derivative @ velocity for derivative in gradient])  # (2, N, 2): ∂/∂x and ∂/∂y of u, v
     stress_slopes = _stress_slopes(flow, strain_rate, gradient, to_nodes)
@@ -108,7 +112,7 @@ def audit(
         "velocity_error_estimate": error,
         "audit.heating": _heating(parts, flow, strain_rate, time),
     }
-    doubts = [limit.sentence for name, limit in LIMITS.items() if limit.doubt and found[name] > limit.largest]
+    doubts += [limit.sentence for name, limit in LIMITS.items() if limit.doubt and found[name] > limit.largest]
     return found | {"doubt": "; ".join(doubts)}
 
 

@@ -42,8 +42,6 @@ class Collocation(Discretizer):
     degree: int = Field(2, ge=1, le=4, description="degree of the polynomials")
     balanced: bool = Field(True, description="supports grow until every quadrant that has nodes nearby is served")
 
-    default_error_estimator: ClassVar = {"kind": "delaunay"}
-
     weak: ClassVar[float] = 1e-3
     """Quality of a support below which it is enlarged."""
     growths: ClassVar[int] = 3

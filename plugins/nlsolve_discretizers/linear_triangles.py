@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, ClassVar, Literal
+from typing import Any, Literal
 
 import numpy as np
 import scipy.sparse as sp
@@ -25,7 +25,6 @@ class LinearTriangles(Discretizer):
     """
 
     kind: Literal["delaunay"] = "delaunay"
-    default_error_estimator: ClassVar = {"kind": "mls"}
 
     def operators(self, cloud: Cloud, volumetric: bool) -> Operators:
         """B, S and, when asked for, B_θ, S_θ, in conservative form."""

@@ -8,16 +8,16 @@ import numpy as np
 import pandas as pd
 import pytest
 from cases import setup
-from nlsolve_discretizers import LinearTriangles, MovingLeastSquares, RadialBasis
+from nlsolve_discretizers import LinearTriangles, MovingLeastSquares
 from nlsolve_laws import PowerLaw
-from nlsolve_scenes import Channel, EccentricCylinders, StirringTool
+from nlsolve_scenes import Channel, StirringTool
 from nlsolve_scenes.nodes.rings import GradedRings, Rings
 
 from nlsolve import SolveError, Status
 from nlsolve.cli.printing import left_out
 from nlsolve.flow.momentum import Flow
 from nlsolve.flow.validity import HEAT_CAPACITY, LIMITS, audit
-from nlsolve.plugin import Cloud, ConstitutiveLaw, Discretizer, FlowScene, NodeMotion, Physics, TimeSteps
+from nlsolve.plugin import Cloud, ConstitutiveLaw, FlowScene, NodeMotion, Physics, TimeSteps
 from nlsolve.results.columns import RUNS
 from nlsolve.solving.simulate import run_case as march
 from nlsolve.solving.stopping import StoppingTest
@@ -246,59 +246,3 @@ def test_a_smooth_field_that_is_wrong_on_a_ragged_cloud_is_out_of_balance() -> N
     assert ragged["audit.balance"] > LIMITS["audit.balance"].largest > even["audit.balance"]
     assert "not in balance" in ragged["doubt"]
     assert even["doubt"] == ""
-
-
-# The error, estimated by another discretisation.
-
-TRIANGLES = LinearTriangles()
-GRADED = GradedRings(first=0.08, growth=0.15, spacing=0.4)
-PENALTY, ITERATED = Physics(penalty=1e4), Physics(penalty=1e2, divergence_tolerance=1e-6)
-MARCHED = {"physics": Physics(inertia=True), "time": TimeSteps(horizon=2e-4), "motion": LAGRANGIAN}
-
-
-@pytest.mark.parametrize(
-    ("scene", "index", "discretizer", "sections"),
-    [
-        (spin(nodes=GRADED), 0.3, MovingLeastSquares(), {}),
-        (spin(nodes=GRADED), 0.1324, MovingLeastSquares(support=15, force_support=18), {}),  # wrong, and smooth
-        (spin(nodes=GRADED), 0.1324, MovingLeastSquares(degree=1), {}),
-        (spin(nodes=GRADED), 0.1324, RadialBasis(), {}),
-        (spin(), 1.0, MovingLeastSquares(points="nodes"), {}),
-        (spin(nodes=GRADED), 0.3, MovingLeastSquares(), {"physics": PENALTY}),
-        (spin(nodes=GRADED), 0.3, MovingLeastSquares(form="conservative"), {"physics": ITERATED}),
-        (spin(nodes=GRADED), 0.3, MovingLeastSquares(), MARCHED),
-        (EccentricCylinders(), 1.0, MovingLeastSquares(points="nodes"), {"physics": PENALTY}),
-    ],
-)
-def test_the_estimate_misses_the_error_by_that_of_the_estimator(
-    scene: FlowScene, index: float, discretizer: Discretizer, sections: dict[str, Any]
-) -> None:
-    """|‖v − v′‖ − ‖v − v_exact‖| ≤ ‖v′ − v_exact‖, and more as one is over ‖v‖, the other over ‖v_exact‖. A tenth more
-    because v′ is one Newton step from v.
-    """
-    row = summary(scene, index, discretizer=discretizer, error_estimator=TRIANGLES, **sections)
-    others = summary(scene, index, discretizer=TRIANGLES, **sections)["velocity_error_inside"]
-    error, estimate = row["velocity_error_inside"], row["velocity_error_estimate"]
-    assert others < error / 2.0
-    assert abs(estimate - error) < 1.1 * (others + error * estimate)
-
-
-def test_a_wrong_field_without_another_blemish_is_in_doubt_by_the_estimate() -> None:
-    plain, estimated = (
-        summary(spin(nodes=GRADED), 0.1324, discretizer=MovingLeastSquares(degree=1), error_estimator=other)
-        for other in (None, TRIANGLES)
-    )
-    assert plain["velocity_error_inside"] > 0.05
-    assert np.isnan(plain["velocity_error_estimate"])
-    assert plain["doubt"] == ""
-    assert "another discretization" in estimated["doubt"]
-
-
-def test_an_estimate_that_cannot_be_made_says_so() -> None:
-    class Fails(LinearTriangles):
-        def operators(self, cloud: Cloud, volumetric: bool) -> Any:
-            raise SolveError(Status.BAD_CLOUD, "the triangles are inside out")
-
-    row = summary(spin(), error_estimator=Fails())
-    assert row["status"] == "converged"
-    assert row["doubt"] == "the audits could not be made: the triangles are inside out"

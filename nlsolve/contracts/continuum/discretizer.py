@@ -90,9 +90,9 @@ class Discretizer(Component, ABC):
     """Builds the operators of a cloud."""
 
     noun: ClassVar[str] = "discretizer"
-    default_error_estimator: ClassVar[Mapping[str, Any] | None] = None
-    """Table of the discretizer that estimates the error of this one's solutions when a study names none. It is of
-    another kind, so that its errors differ. None: no estimate.
+    default_error_estimator: ClassVar[Mapping[str, Any] | None] = {"kind": "delaunay"}
+    """Table of the discretizer that solves the flow on an enriched cloud, to estimate the error of this one's solutions
+    when a study names none. None: no estimate.
     """
 
     @abstractmethod

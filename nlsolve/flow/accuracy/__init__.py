@@ -1,0 +1,1 @@
+"""How accurate a solved flow is: clouds with more nodes, and the error that a solution on them shows."""

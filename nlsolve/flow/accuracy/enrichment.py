@@ -1,0 +1,39 @@
+"""A cloud with more nodes: one in the middle of every edge of its triangulation that has a node inside."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial import Delaunay
+
+from nlsolve.contracts.continuum.cloud import Cloud, Indices
+from nlsolve.series import Array
+
+
+@dataclass(frozen=True)
+class Enriched:
+    """A cloud (N + E nodes) whose first N nodes are those of a coarser one.
+
+    ends : the nodes between which each further node was put, (E, 2).
+    """
+
+    cloud: Cloud
+    ends: Indices
+
+    def carry(self, values: Array) -> Array:
+        """Values at the coarser cloud's nodes (N, …) -> at all nodes (N + E, …): means of both ends."""
+        return np.concatenate([values, values[self.ends].mean(axis=1)])
+
+
+def inner_edges(cloud: Cloud) -> Indices:
+    """The edges of the Delaunay triangulation with a node inside, (E, 2). Across a hole both ends are at its wall."""
+    corners = Delaunay(cloud.nodes).simplices
+    sides = np.concatenate([corners[:, [0, 1]], corners[:, [1, 2]], corners[:, [2, 0]]])
+    edges = np.unique(np.sort(sides, axis=1), axis=0)
+    return edges[~cloud.on_boundary[edges].all(axis=1)]
+
+
+def enriched(cloud: Cloud, edges: Indices) -> Enriched:
+    """The cloud with a node in the middle of each of these edges (E, 2)."""
+    return Enriched(Cloud(np.concatenate([cloud.nodes, cloud.nodes[edges].mean(axis=1)]), cloud.boundaries), edges)
