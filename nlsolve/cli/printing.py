@@ -25,8 +25,8 @@ from nlsolve.running.store.reading import output_file
 from nlsolve.show.tables import Table
 from nlsolve.study.study import Study
 
-MOST_RULED = 500
-"""Rows up to which a table is printed with rules; ruling ten thousand takes half a minute."""
+MOST_RULED_ROWS, MOST_RULED_CELLS = 500, 5000
+"""Size up to which a table is printed with rules; ruling a hundred thousand cells takes half a minute."""
 
 UNFOLDED = 400
 """Characters a line may have in a file or a pipe."""
@@ -56,13 +56,13 @@ def stdout() -> Console:
 
 
 def print_frame(title: str, frame: pd.DataFrame) -> None:
-    """Print a frame on standard output: as a table, or, of many rows, as lines with aligned columns."""
+    """Print a frame on standard output: as a table, or, of many cells, as lines with aligned columns."""
     headings = [str(heading) for heading in frame.columns]
     rows = [
         [f"{value:.4g}" if isinstance(value, float) else str(value) for value in row]
         for row in frame.itertuples(index=False)
     ]
-    if len(rows) > MOST_RULED:
+    if _is_large(frame):
         widths = [max(map(len, column)) for column in zip(headings, *rows, strict=True)]
         lines = ("  ".join(map(str.ljust, row, widths)).rstrip() for row in [headings, *rows])
         typer.echo("\n".join([title, *lines]))
@@ -77,12 +77,16 @@ def print_frame(title: str, frame: pd.DataFrame) -> None:
 
 def print_table(table: Table) -> None:
     """Print a declared table, and what it is compared with, on standard output."""
-    if len(table.cells) > MOST_RULED:
+    if _is_large(table.cells):
         for title, frame in table.flat().items():
             print_frame(title, frame)
         return
     for printed in table.rich():
         stdout().print(printed)
+
+
+def _is_large(frame: pd.DataFrame) -> bool:
+    return len(frame) > MOST_RULED_ROWS or frame.size > MOST_RULED_CELLS
 
 
 def print_results(results: Results, as_json: bool) -> None:

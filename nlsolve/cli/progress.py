@@ -58,7 +58,7 @@ class Watch:
         due = event.run is not None or time.monotonic() - self.told > SECONDS_BETWEEN_LINES
         if due and not self.console.is_terminal:
             self.told = time.monotonic()
-            self.console.print(words, markup=False, highlight=False, soft_wrap=True)
+            print(words, file=self.console.file, flush=True)
 
     def debug(self, error: BaseException) -> None:
         """Take the bar down and debug an error where it was raised."""

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import scipy
 import scipy.sparse as sp
-from scipy.spatial import cKDTree
 
 from nlsolve.contracts.continuum.cloud import Cloud, node_major
 from nlsolve.contracts.continuum.discretizer import Discretizer, Operators
@@ -169,7 +169,7 @@ class Flow(NonlinearProblem):
         others = discretizer.operators(self.cloud, self._modulus is not None)
         modulus: float | Array = 0.0
         if self._modulus is not None and self.operators.volumetric is not None and others.volumetric is not None:
-            tree = cKDTree(self.operators.volumetric.points)
+            tree = scipy.spatial.cKDTree(self.operators.volumetric.points)
             modulus = self._modulus[tree.query(others.volumetric.points)[1]]
         inertia, convection = self._terms
         boundary = self._lifted[node_major(self.cloud.boundary)].reshape(-1, 2)
@@ -241,7 +241,7 @@ class Flow(NonlinearProblem):
         forces = np.nan_to_num(np.linalg.norm(residual.reshape(-1, 2), axis=1), nan=np.inf)
         largest = self.cloud.interior[np.flatnonzero(forces == forces.max())]
         rate = np.sqrt(rate_squared(self.strain_rate(u)))
-        beside = cKDTree(self.operators.strain.points).query(self.cloud.nodes[largest])[1]
+        beside = scipy.spatial.cKDTree(self.operators.strain.points).query(self.cloud.nodes[largest])[1]
         node, nearest = min(zip(largest, beside, strict=True), key=lambda pair: float(rate[pair[1]]))
         floor = self.law.regularization_rate or 0.0
         return {

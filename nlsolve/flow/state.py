@@ -6,7 +6,7 @@ from copy import copy
 from typing import Any, Protocol
 
 import numpy as np
-from scipy.spatial import cKDTree
+import scipy
 
 from nlsolve.contracts.continuum.cloud import Cloud
 from nlsolve.contracts.continuum.discretizer import Discretizer, Operators, PointOperators
@@ -183,7 +183,7 @@ class FlowState:
     def rate_squared_at_volume_points(self, operators: Operators) -> Array:
         """ε̄² of the velocity so far, taken at the strain point nearest to each volume point, shape (L,)."""
         assert operators.volumetric is not None
-        nearest = cKDTree(operators.strain.points).query(operators.volumetric.points)[1]
+        nearest = scipy.spatial.cKDTree(operators.strain.points).query(operators.volumetric.points)[1]
         return rate_squared(operators.strain_rate(self.velocity)[:, nearest])
 
     def between_volume_points(self, here: Operators, there: Operators) -> Any:

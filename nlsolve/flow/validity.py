@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy.spatial import cKDTree
+import scipy
 
 from nlsolve.contracts.continuum.law import CONTRACTION, rate_squared, stress
 from nlsolve.contracts.status import SolveError
@@ -213,7 +213,7 @@ def _resolution(flow: Flow, velocity: Array, slopes: Array) -> float:
     inside is below 2 %, above 0.5 where it is above 9 %. A wrong velocity that is smooth goes unnoticed.
     """
     nodes = flow.cloud.nodes
-    near = cKDTree(nodes).query(nodes, min(NEIGHBOURS + 1, len(nodes)))[1][:, 1:]
+    near = scipy.spatial.cKDTree(nodes).query(nodes, min(NEIGHBOURS + 1, len(nodes)))[1][:, 1:]
     i, j = np.repeat(np.arange(len(nodes)), near.shape[1]), near.ravel()
     inner = ~(flow.cloud.on_boundary[i] | flow.cloud.on_boundary[j])
     i, j = i[inner], j[inner]

@@ -47,7 +47,9 @@ def steps_frame(rows: Sequence[Mapping[str, Any]]) -> pd.DataFrame:
 
 def rows_of(frame: pd.DataFrame) -> list[Row]:
     """The rows of a frame, in their order, every value with its type."""
-    return [dict(zip(map(str, frame.columns), row, strict=True)) for row in frame.itertuples(index=False)]
+    names = [str(name) for name in frame.columns]
+    columns = [frame.iloc[:, place].to_numpy(dtype=object).tolist() for place in range(len(names))]
+    return [dict(zip(names, row, strict=True)) for row in zip(*columns, strict=True)]
 
 
 def json_rows(frame: pd.DataFrame) -> list[Row]:

@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
+import scipy
 from numpy.typing import ArrayLike
-from scipy.spatial import cKDTree
 
 from nlsolve.contracts.outcome import Outcome
 from nlsolve.contracts.scene import Simulation
@@ -84,7 +84,7 @@ class March:
     def _at(self, k: int, places: Array) -> Array:
         """V(x, t_k) at `places` (T, 2) [mm], (T, 2) [mm/s]; NaN where a marker would count as lost."""
         nodes = self.nodes[k]
-        tree = cKDTree(nodes)
+        tree = scipy.spatial.cKDTree(nodes)
         distance, nearest = tree.query(places)
         spacing = tree.query(nodes, 2)[0][:, 1]
         found: Array = self.parts.discretizer.values(nodes, within(nodes, places)) @ self.velocities[k]

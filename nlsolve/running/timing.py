@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import scipy.optimize
+import scipy
 from threadpoolctl import threadpool_limits
 
 from nlsolve.contracts.linear_solver import LinearSolver

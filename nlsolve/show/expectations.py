@@ -152,10 +152,10 @@ class Finding:
         )
 
 
-def judged(expectations: Iterable[Expectation], tables: Sequence[TableSpec], runs: pd.DataFrame) -> tuple[Finding, ...]:
+def judged(expectations: Sequence[Expectation], tables: Sequence[TableSpec], runs: pd.DataFrame) -> tuple[Finding, ...]:
     """The expectations of a study, held against the runs and the declared tables."""
     specs = {spec.name: spec for spec in tables}
-    rows = rows_of(runs)
+    rows = rows_of(runs) if expectations else []
     found = []
     for expectation in expectations:
         try:

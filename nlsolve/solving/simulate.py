@@ -10,6 +10,7 @@ from typing import Any, Protocol
 
 import numpy as np
 import pandas as pd
+import scipy
 
 from nlsolve.contracts.linear_solver import LinearSolver
 from nlsolve.contracts.nonlinear_solver import NonlinearSolver
@@ -28,6 +29,9 @@ from nlsolve.solving.stopping import Budget, StoppingTest
 from nlsolve.solving.tangent import Tangent
 from nlsolve.solving.way import Walk, Way
 from nlsolve.solving.work.ledger import Ledger
+
+LOADED_WHEN_ASKED_FOR = ("optimize", "spatial", "special")
+"""Packages of scipy that cases use, which scipy imports when they are first asked for."""
 
 
 class Method(Protocol):
@@ -116,6 +120,8 @@ def simulate(
     way : the way to the first state as another case has solved it, whose outcomes are taken as far as they serve.
     share : called with the way to the first state when it is solved, or has failed; not when it was taken whole.
     """
+    for name in LOADED_WHEN_ASKED_FOR:  # before a clock runs: importing them is no work of the method
+        getattr(scipy, name)
     nothing: Callable[[Any], None] = lambda told: None  # noqa: E731
     return _Run(build, method, listen or nothing, clock, watch or nothing, way or Way(()), share or nothing).record()
 

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from typing import Literal
 
 import numpy as np
+import scipy
 from pydantic import Field
-from scipy.special import binom
 
 from nlsolve.plugin import Predictor
 
@@ -46,4 +46,4 @@ class Polynomial(Predictor):
     def guess(self, past: Sequence[np.ndarray]) -> np.ndarray:
         """Σ_i c_i v_{k−i}."""
         i = np.arange(len(past))
-        return np.tensordot((-1.0) ** i * binom(len(past), i + 1), np.stack(past), axes=1)
+        return np.tensordot((-1.0) ** i * scipy.special.binom(len(past), i + 1), np.stack(past), axes=1)

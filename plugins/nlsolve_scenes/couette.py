@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import Literal
 
 import numpy as np
+import scipy
 from pydantic import Field
-from scipy.optimize import brentq
 
 from nlsolve.plugin import ConstitutiveLaw, Exact, Series
 from nlsolve_scenes.stirring_tool import StirringTool
@@ -53,7 +53,7 @@ class Couette(StirringTool):
         slope = _log_stress(law, np.linspace(SLOWEST, low + FASTEST, 4000)).coefficient(1)
         if not (slope > 0.0).all() or not excess(low) <= 0.0 <= excess(low + FASTEST):
             return None
-        return float(brentq(excess, low, low + FASTEST, xtol=1e-14))
+        return float(scipy.optimize.brentq(excess, low, low + FASTEST, xtol=1e-14))
 
     def _log_rates(self, law: ConstitutiveLaw, wall: float, radii: np.ndarray) -> np.ndarray:
         """log γ̇ at `radii` (R,) where it is `wall` at the tool: log τ is less by 2 log(r/r_t)."""

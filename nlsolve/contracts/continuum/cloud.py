@@ -7,8 +7,8 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
 from nlsolve.contracts.status import SolveError, Status
 from nlsolve.series import Array
@@ -40,7 +40,7 @@ class Cloud:
     @cached_property
     def nearest_distance(self) -> Array:
         """Distance of every node to its nearest neighbour, shape (N,) [mm]."""
-        return cKDTree(self.nodes).query(self.nodes, 2)[0][:, 1]
+        return scipy.spatial.cKDTree(self.nodes).query(self.nodes, 2)[0][:, 1]
 
     @cached_property
     def on_boundary(self) -> NDArray[np.bool_]:

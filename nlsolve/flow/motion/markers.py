@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 import numpy as np
-from scipy.spatial import cKDTree
+import scipy
 
 from nlsolve.contracts.continuum.cloud import Cloud
 from nlsolve.contracts.continuum.discretizer import Discretizer
@@ -77,7 +77,7 @@ class Markers:
         inside = self.initial.interior
         followed = inside[np.isfinite(self.places[inside, 0])]
         moved = runge_kutta(self.places[followed], [start], middle, [end], self.increment, self._velocity_at)
-        distance, nearest = cKDTree(cloud.nodes).query(moved)
+        distance, nearest = scipy.spatial.cKDTree(cloud.nodes).query(moved)
         lost = (distance > LOST * cloud.nearest_distance[nearest]) | (moved != within(cloud.nodes, moved)).any(axis=1)
         moved[lost] = np.nan
         self.places[followed] = moved

@@ -8,7 +8,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from scipy.spatial import cKDTree
+import scipy
 
 from nlsolve.contracts.continuum.cloud import Cloud
 from nlsolve.contracts.continuum.discretizer import Discretizer, Operators
@@ -30,7 +30,7 @@ class Neighbourhoods:
     """The k nodes j of a cloud that are nearest to each node i, and their distances d_ij [mm], both (N, k)."""
 
     def __init__(self, cloud: Cloud) -> None:
-        distance, near = cKDTree(cloud.nodes).query(cloud.nodes, min(NEIGHBOURS + 1, len(cloud.nodes)))
+        distance, near = scipy.spatial.cKDTree(cloud.nodes).query(cloud.nodes, min(NEIGHBOURS + 1, len(cloud.nodes)))
         self.distance, self.near = distance[:, 1:], near[:, 1:]
 
     def parted(self, nodes: Array) -> float:

@@ -8,6 +8,7 @@ from __future__ import annotations
 import json
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import asdict, dataclass
+from functools import cache, cached_property
 from pathlib import Path
 from typing import Any
 
@@ -35,7 +36,7 @@ class Identity:
     code: Mapping[str, str]
     files: Mapping[str, str]
 
-    @property
+    @cached_property
     def key(self) -> str:
         """The name of a part: CASE-REST, with one digest of code and files."""
         rest = json.dumps([dict(self.code), dict(self.files)], sort_keys=True)
@@ -70,33 +71,41 @@ def way_of(case: Case) -> str:
 
 
 def _identity(name: str, sections: Collection[Any]) -> Identity:
-    files: dict[str, str] = {}
-    for section in sections:
-        for value in _inside(section):
-            files |= {str(path): _content(path) for path in files_read(value)}
-    return Identity(name, code_of(sections), dict(sorted(files.items())))
+    models = [value for section in sections for value in _inside(section)]
+    files = {str(path): _content(path) for value in models for path in files_read(value)}
+    return Identity(name, _code_of_classes(frozenset(map(type, models))), dict(sorted(files.items())))
 
 
 def code_of(sections: Iterable[Any]) -> dict[str, str]:
     """Package -> version and fingerprint of its source, for the classes of these components at any depth."""
+    return dict(_code_of_classes(frozenset(type(value) for section in sections for value in _inside(section))))
+
+
+@cache
+def _code_of_classes(classes: frozenset[type]) -> Mapping[str, str]:
     found: dict[str, str] = {}
-    for section in sections:
-        for value in _inside(section):
-            found |= sources_of(type(value))
+    for cls in classes:
+        found |= sources_of(cls)
     return dict(sorted(found.items()))
 
 
 def files_read(value: BaseModel) -> Iterator[Path]:
     """The files whose contents a component depends on: its fields of type `InputFile`, and those that hold a Path."""
-    for name, field in type(value).model_fields.items():
+    for name, is_named in _fields(type(value)):
         given = getattr(value, name)
-        if isinstance(given, Path) or (isinstance(given, str) and NAMES_A_FILE in field.metadata):
+        if isinstance(given, Path) or (is_named and isinstance(given, str)):
             yield Path(given)
 
 
-def _models(parts: Any) -> Iterator[BaseModel]:
+@cache
+def _fields(cls: type[BaseModel]) -> list[tuple[str, bool]]:
+    """The fields of a class, and whether each is of type `InputFile`."""
+    return [(name, NAMES_A_FILE in field.metadata) for name, field in cls.model_fields.items()]
+
+
+def _models(parts: BaseModel) -> Iterator[BaseModel]:
     """Every component of a case, at any depth."""
-    for name in type(parts).model_fields:
+    for name, _ in _fields(type(parts)):
         yield from _inside(getattr(parts, name))
 
 

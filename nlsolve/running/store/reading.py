@@ -207,12 +207,13 @@ def finished(folder: Path, cases: tuple[Planned, ...], with_frames: bool = True)
     """The frames of those cases that are finished; of `runs` alone unless other frames are asked for or needed."""
     parts = Parts(folder)
     references = {case_of(case.key): case.reference for case in cases if case.reference}
+    nothing = pd.DataFrame()
     found = []
     for case in cases:
         entry = parts.entry(case.key)
         if entry is None:
             continue
-        frames = parts.frames(entry) if with_frames or references else (pd.DataFrame(), pd.DataFrame())
+        frames = parts.frames(entry) if with_frames or references else (nothing, nothing)
         if frames is not None:
             found.append(Part(entry.run(case.names), *frames))
     return completed(merge(found), references)

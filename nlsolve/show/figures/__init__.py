@@ -11,11 +11,10 @@ from pathlib import Path
 from typing import Annotated
 
 import pandas as pd
-from matplotlib import rc_context
-from matplotlib.figure import Figure
 from pydantic import Field
 
 from nlsolve.results.frames import Frames
+from nlsolve.show import plotting
 from nlsolve.show.figures.base import BaseFigure, FigureError
 from nlsolve.show.figures.crossover import CrossoverFigure
 from nlsolve.show.figures.line import LineFigure
@@ -60,19 +59,19 @@ FigureSpec = Annotated[
 """What a study's `[[figure]]` may be."""
 
 
-def draw(spec: BaseFigure, runs: pd.DataFrame, steps: pd.DataFrame, fields: pd.DataFrame) -> Figure:
+def draw(spec: BaseFigure, runs: pd.DataFrame, steps: pd.DataFrame, fields: pd.DataFrame) -> plotting.Figure:
     """The declared figure of these results. Raises FigureError when there is nothing to draw."""
-    with rc_context(STYLE):
-        figure = Figure(figsize=(COLUMN, 0.72 * COLUMN), layout="constrained")
+    with plotting.rc_context(STYLE):
+        figure = plotting.Figure(figsize=(COLUMN, 0.72 * COLUMN), layout="constrained")
         spec.paint(figure, Frames(runs, steps, fields))
     return figure
 
 
-def save(figure: Figure, folder: Path, name: str) -> list[Path]:
+def save(figure: plotting.Figure, folder: Path, name: str) -> list[Path]:
     """Write `name`.png and `name`.pdf into the folder, without dates, and return their paths."""
     folder.mkdir(parents=True, exist_ok=True)
     paths = [folder / f"{name}.png", folder / f"{name}.pdf"]
-    with rc_context(STYLE):
+    with plotting.rc_context(STYLE):
         figure.savefig(paths[0], dpi=DOTS_PER_INCH)
         figure.savefig(paths[1], metadata={"CreationDate": None})
     return paths

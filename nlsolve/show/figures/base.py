@@ -8,13 +8,13 @@ from difflib import get_close_matches
 from typing import ClassVar
 
 import pandas as pd
-from matplotlib.figure import Figure
 from pydantic import Field
 
 from nlsolve.contracts.component import Component
 from nlsolve.results.columns import RENAMED, no_such_column
 from nlsolve.results.frames import Frames
 from nlsolve.results.selection import Names, Where
+from nlsolve.show import plotting
 
 
 class FigureError(ValueError):
@@ -42,7 +42,7 @@ class BaseFigure(Component, ABC):
         return {"where": tuple(self.where), "group": self.group}
 
     @abstractmethod
-    def paint(self, figure: Figure, frames: Frames) -> None:
+    def paint(self, figure: plotting.Figure, frames: Frames) -> None:
         """Draw on an empty figure."""
 
     def refuse(self, sentence: str) -> FigureError:

@@ -5,9 +5,6 @@ from __future__ import annotations
 from typing import Any, Literal
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
 from pydantic import Field
 
 from nlsolve.registry.problems import StudyError
@@ -15,6 +12,7 @@ from nlsolve.results.costs.crossover import OTHER, Cell, Crossover, by_size, ref
 from nlsolve.results.costs.lower_envelope import lower_envelope
 from nlsolve.results.frames import Frames, rows_of
 from nlsolve.results.selection import Names
+from nlsolve.show import plotting
 from nlsolve.show.figures.base import BaseFigure
 from nlsolve.show.figures.cases import select
 from nlsolve.show.figures.style import ACCENT, PAGE, curve_style, join, legend_outside
@@ -40,7 +38,7 @@ class CrossoverFigure(BaseFigure):
     def columns_of_runs(self) -> dict[str, Names]:
         return {**super().columns_of_runs(), "strategy": self.strategy, "size": self.size, "backend": self.backend}
 
-    def paint(self, figure: Figure, frames: Frames) -> None:
+    def paint(self, figure: plotting.Figure, frames: Frames) -> None:
         for column in (*self.strategy, *self.size, *self.backend):
             self.require(column, frames.runs, "runs")
         axes_of = Crossover(strategy=self.strategy, size=self.size, backend=self.backend)
@@ -68,14 +66,17 @@ class CrossoverFigure(BaseFigure):
         if self.title:
             figure.suptitle(self.title, fontsize=9)
         handles: list[Any] = [
-            Line2D([], [], label=name, **curve_style(place, 1, markers=True)) for place, name in enumerate(strategies)
+            plotting.Line2D([], [], label=name, **curve_style(place, 1, markers=True))
+            for place, name in enumerate(strategies)
         ]
-        handles.append(Line2D([], [], color="0.85", linewidth=5, label=ENVELOPE))
+        handles.append(plotting.Line2D([], [], color="0.85", linewidth=5, label=ENVELOPE))
         if any(cell.verdict == OTHER for cell in cells):
-            handles.append(Line2D([], [], color=ACCENT, linewidth=0.8, linestyle=":", label=LOST))
+            handles.append(plotting.Line2D([], [], color=ACCENT, linewidth=0.8, linestyle=":", label=LOST))
         legend_outside(figure, handles, [str(handle.get_label()) for handle in handles])
 
-    def _panel(self, axes: Axes, reference: Cell, members: list[Cell], strategies: list[str], across: Any) -> None:
+    def _panel(
+        self, axes: plotting.Axes, reference: Cell, members: list[Cell], strategies: list[str], across: Any
+    ) -> None:
         """The lines of one size, their envelope, and the runs of its cells."""
         slopes, rests = reference.factorizations, reference.rests
         lowest = np.min(slopes[:, None] * across + rests[:, None], axis=0)

@@ -7,15 +7,13 @@ from typing import Literal
 
 import numpy as np
 import pandas as pd
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
-from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 from pydantic import Field
 
 from nlsolve.contracts.status import Status
 from nlsolve.results.frames import Frames
 from nlsolve.results.selection import Names
+from nlsolve.show import plotting
 from nlsolve.show.figures.base import BaseFigure, listing
 from nlsolve.show.figures.cases import ending, labelled, select
 from nlsolve.show.figures.style import ACCENT, DASHES, FAILED, axis_label, bracketed, curve_style, finish, join, symbol
@@ -39,7 +37,7 @@ class LineFigure(BaseFigure):
         own = {"x": (self.x,), "y": self.y} if self.source == "runs" else {}
         return {**super().columns_of_runs(), **own}
 
-    def paint(self, figure: Figure, frames: Frames) -> None:
+    def paint(self, figure: plotting.Figure, frames: Frames) -> None:
         frame = frames.steps if self.source == "steps" else frames.runs
         for column in (self.x, *self.y):
             self.require(column, frame, self.source)
@@ -68,7 +66,7 @@ class LineFigure(BaseFigure):
         if worded:
             axes.margins(x=0.15)
         elif "x" not in self.log and _whole(frame[self.x]):
-            axes.xaxis.set_major_locator(MaxNLocator(integer=True, steps=[1, 5, 10]))
+            axes.xaxis.set_major_locator(plotting.MaxNLocator(integer=True, steps=[1, 5, 10]))
         finish(figure, axes, self.title)
 
     def _curves(self, frames: Frames) -> list[tuple[str, pd.DataFrame]]:
@@ -89,7 +87,7 @@ class LineFigure(BaseFigure):
         sort = self.source == "runs" and _numeric(points[self.x])
         return points.sort_values(self.x, kind="stable") if sort else points
 
-    def _cross_out(self, axes: Axes, points: pd.DataFrame, column: str) -> None:
+    def _cross_out(self, axes: plotting.Axes, points: pd.DataFrame, column: str) -> None:
         """Mark the runs that did not converge with a cross."""
         if self.source == "steps" or "status" not in points or "status" in (self.x, column):
             return

@@ -8,13 +8,6 @@ from typing import Any, Literal
 
 import numpy as np
 import pandas as pd
-from matplotlib.axes import Axes
-from matplotlib.cm import ScalarMappable
-from matplotlib.colors import LogNorm
-from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
-from matplotlib.patches import Patch, Polygon, Rectangle
-from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 from pydantic import Field
 
 from nlsolve.contracts.status import Status
@@ -22,6 +15,7 @@ from nlsolve.results.frames import Frames, rows_of
 from nlsolve.results.parameters import differing_parameters, names_settings
 from nlsolve.results.selection import Names
 from nlsolve.results.verdicts import ACCEPTED, WRONG, Run, doubt, is_error, number, outcome, percent, status_of
+from nlsolve.show import plotting
 from nlsolve.show.figures.base import BaseFigure, listing
 from nlsolve.show.figures.cases import label_of, number_text, select
 from nlsolve.show.figures.style import (
@@ -77,7 +71,7 @@ class MapFigure(BaseFigure):
     def columns_of_runs(self) -> dict[str, Names]:
         return {**super().columns_of_runs(), "x": self.x, "y": self.y, "value": (self.value,)}
 
-    def paint(self, figure: Figure, frames: Frames) -> None:
+    def paint(self, figure: plotting.Figure, frames: Frames) -> None:
         runs = select(self, frames.runs)
         for column in (*self.x, *self.y, self.value):
             self.require(column, runs, "runs")
@@ -125,7 +119,7 @@ class MapFigure(BaseFigure):
         wrong = outcome(run, self.accepted, error) == WRONG
         return Tile(column, row, number(run[self.value]), status_of(run), bool(doubt(run)), wrong)
 
-    def _norm(self, tiles: Sequence[Tile]) -> LogNorm | None:
+    def _norm(self, tiles: Sequence[Tile]) -> plotting.LogNorm | None:
         """The colour scale: least to largest number of the converged runs, errors up to 100 %; None without numbers."""
         converged = [tile.value for tile in tiles if not tile.failed]
         numbers = [value for value in converged if np.isfinite(value) and value > 0]
@@ -136,9 +130,9 @@ class MapFigure(BaseFigure):
         low, high = 10 ** np.floor(np.log10(min(numbers))), 10 ** np.ceil(np.log10(max(numbers)))
         if is_error(self.value):
             high = min(high, 1.0)
-        return LogNorm(low, high if high > low else 10 * low, clip=True)
+        return plotting.LogNorm(low, high if high > low else 10 * low, clip=True)
 
-    def _grid(self, axes: Axes, columns: Sequence[str], rows: Sequence[str], leaning: bool) -> None:
+    def _grid(self, axes: plotting.Axes, columns: Sequence[str], rows: Sequence[str], leaning: bool) -> None:
         axes.set(xlim=(-0.5, len(columns) - 0.5), ylim=(len(rows) - 0.5, -0.5))
         axes.set_xticks(range(len(columns)), columns)
         axes.set_yticks(range(len(rows)), rows)
@@ -159,16 +153,18 @@ class MapFigure(BaseFigure):
             if self.separate and families[row] != families[row - 1]:
                 axes.axhline(row - 0.5, color="0.25", linewidth=0.6, zorder=4)
 
-    def _paint_tile(self, axes: Axes, tile: Tile, norm: LogNorm | None, size: float) -> None:
+    def _paint_tile(self, axes: plotting.Axes, tile: Tile, norm: plotting.LogNorm | None, size: float) -> None:
         left, top = tile.column - 0.5, tile.row - 0.5
         ink = "0.1"
         if tile.failed:
-            axes.add_patch(Rectangle((left, top), 1, 1, **FAILED_FACE))
+            axes.add_patch(plotting.Rectangle((left, top), 1, 1, **FAILED_FACE))
         elif norm is not None and np.isfinite(tile.value):
-            red, green, blue, _ = ERROR_MAP(norm(max(tile.value, norm.vmin or 0)))
+            red, green, blue, _ = plotting.colormaps[ERROR_MAP](norm(max(tile.value, norm.vmin or 0)))
             ink = "0.1" if 0.3 * red + 0.59 * green + 0.11 * blue > 0.5 else "white"
-            axes.add_patch(Rectangle((left, top), 1, 1, facecolor=(red, green, blue), edgecolor="none"))
-        axes.add_patch(Rectangle((left, top), 1, 1, facecolor="none", edgecolor="white", linewidth=0.8, zorder=2))
+            axes.add_patch(plotting.Rectangle((left, top), 1, 1, facecolor=(red, green, blue), edgecolor="none"))
+        axes.add_patch(
+            plotting.Rectangle((left, top), 1, 1, facecolor="none", edgecolor="white", linewidth=0.8, zorder=2)
+        )
         words = code(tile.status) if tile.failed else short(tile.value, self.value)
         box: Any = {"facecolor": "0.93", "edgecolor": "none", "pad": 0.6} if tile.failed else None
         axes.text(
@@ -184,23 +180,25 @@ class MapFigure(BaseFigure):
         )
         if tile.doubted:
             corner = [(left + 0.86, top + 0.04), (left + 0.985, top + 0.04), (left + 0.985, top + 0.5)]
-            axes.add_patch(Polygon(corner, facecolor=DOUBT, edgecolor="white", linewidth=0.4, zorder=3))
+            axes.add_patch(plotting.Polygon(corner, facecolor=DOUBT, edgecolor="white", linewidth=0.4, zorder=3))
         if tile.wrong:
             axes.add_patch(
-                Rectangle(
+                plotting.Rectangle(
                     (left + 0.02, top + 0.07), 0.96, 0.86, facecolor="none", edgecolor=ACCENT, linewidth=1.5, zorder=6
                 )
             )
 
-    def _empty_places(self, axes: Axes, taken: set[tuple[int, int]], columns: int, rows: int, size: float) -> None:
+    def _empty_places(
+        self, axes: plotting.Axes, taken: set[tuple[int, int]], columns: int, rows: int, size: float
+    ) -> None:
         for column in range(columns):
             for row in range(rows):
                 if (column, row) not in taken:
                     axes.text(column, row, "·", ha="center", va="center", fontsize=size, color="0.6")
 
-    def _bar(self, figure: Figure, axes: Axes, norm: LogNorm, rows: int) -> None:
+    def _bar(self, figure: plotting.Figure, axes: plotting.Axes, norm: plotting.LogNorm, rows: int) -> None:
         bar = figure.colorbar(
-            ScalarMappable(norm, ERROR_MAP),
+            plotting.ScalarMappable(norm, ERROR_MAP),
             ax=axes,
             location="bottom",
             aspect=40,
@@ -209,27 +207,27 @@ class MapFigure(BaseFigure):
             shrink=0.8,
         )
         bar.set_label(axis_label([self.value], "runs"))
-        bar.ax.xaxis.set_major_locator(LogLocator(numticks=12))
-        bar.ax.xaxis.set_minor_locator(NullLocator())
-        bar.ax.xaxis.set_major_formatter(FuncFormatter(lambda value, _: short(value, self.value)))
+        bar.ax.xaxis.set_major_locator(plotting.LogLocator(numticks=12))
+        bar.ax.xaxis.set_minor_locator(plotting.NullLocator())
+        bar.ax.xaxis.set_major_formatter(plotting.FuncFormatter(lambda value, _: short(value, self.value)))
         bar.outline.set_linewidth(0.5)
 
-    def _legend(self, figure: Figure, tiles: Sequence[Tile]) -> None:
+    def _legend(self, figure: plotting.Figure, tiles: Sequence[Tile]) -> None:
         """A legend of the marks that occur."""
         handles: list[Any] = []
         wrong = [tile for tile in tiles if tile.wrong]
         if wrong:
             limit = short(self.accepted, "velocity_error")
             words = f"false success: error above {limit} ({len(wrong)})"
-            handles.append(Patch(facecolor="white", edgecolor=ACCENT, linewidth=1.5, label=words))
+            handles.append(plotting.Patch(facecolor="white", edgecolor=ACCENT, linewidth=1.5, label=words))
         doubted = sum(tile.doubted for tile in tiles)
         if doubted:
             corner: Any = {"linestyle": "none", "marker": (3, 0, -45), "markersize": 7, "markeredgewidth": 0}
-            handles.append(Line2D([], [], color=DOUBT, label=f"{IN_DOUBT} ({doubted})", **corner))
+            handles.append(plotting.Line2D([], [], color=DOUBT, label=f"{IN_DOUBT} ({doubted})", **corner))
         failed = [tile.status for tile in tiles if tile.failed]
         for status in dict.fromkeys(failed):
             words = f"{code(status)}: {status.word} ({failed.count(status)})"
-            handles.append(Patch(**FAILED_FACE, label=words))
+            handles.append(plotting.Patch(**FAILED_FACE, label=words))
         if handles:
             legend_outside(figure, handles, [handle.get_label() for handle in handles], "lower")
 

@@ -9,9 +9,6 @@ from typing import Annotated, Any, Literal
 
 import numpy as np
 import pandas as pd
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
-from matplotlib.ticker import LogFormatter
 from pydantic import BeforeValidator, Field
 
 from nlsolve.results.columns import is_measured
@@ -21,6 +18,7 @@ from nlsolve.results.profiles import band, ratios, within
 from nlsolve.results.selection import Names
 from nlsolve.results.verdicts import ACCEPTED, Run, number, solved
 from nlsolve.series import Array
+from nlsolve.show import plotting
 from nlsolve.show.figures.base import BaseFigure, listing
 from nlsolve.show.figures.cases import label_of, labelled, select
 from nlsolve.show.figures.style import PAGE, axis_label, curve_style, finish, join, symbol
@@ -78,7 +76,7 @@ class SolvedFigure(BaseFigure):
     def words(self) -> str:
         """The label of the horizontal axis."""
 
-    def paint(self, figure: Figure, frames: Frames) -> None:
+    def paint(self, figure: plotting.Figure, frames: Frames) -> None:
         runs = select(self, frames.runs)
         for column in (*self.problem, *self.cost, self.error):
             self.require(column, runs, "runs")
@@ -93,8 +91,8 @@ class SolvedFigure(BaseFigure):
         right = places[-1] * max(1.05, (places[-1] / places[0]) ** 0.03)
         self._stairs(axes, found.labels, reached, np.r_[places, right])
         axes.set_xlim(places[0], right)
-        axes.xaxis.set_major_formatter(LogFormatter())
-        axes.xaxis.set_minor_formatter(LogFormatter(minor_thresholds=(1.0, 0.4)))
+        axes.xaxis.set_major_formatter(plotting.LogFormatter())
+        axes.xaxis.set_minor_formatter(plotting.LogFormatter(minor_thresholds=(1.0, 0.4)))
         finish(figure, axes, None)
         hard = int(np.isinf(reached).all(axis=0).sum())
         nobody = f"{hard} of {reached.shape[1]} problems are solved by none" if hard else ""
@@ -144,7 +142,7 @@ class SolvedFigure(BaseFigure):
             )
         return float(total)
 
-    def _stairs(self, axes: Axes, labels: tuple[str, ...], reached: Array, places: Array) -> None:
+    def _stairs(self, axes: plotting.Axes, labels: tuple[str, ...], reached: Array, places: Array) -> None:
         shares = within(reached, places)
         ends = band(reached, places, self.interval, self.bootstrap, self.seed) if self.bootstrap else None
         problems = reached.shape[1]

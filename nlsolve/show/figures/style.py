@@ -6,11 +6,8 @@ import re
 from collections.abc import Sequence
 from typing import Any
 
-from matplotlib import colormaps
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
-
 from nlsolve.results.columns import FRAMES
+from nlsolve.show import plotting
 
 MILLIMETRE = 1 / 25.4  # [inch]
 COLUMN, PAGE = 90 * MILLIMETRE, 180 * MILLIMETRE  # widths of one and of two columns of a journal
@@ -19,7 +16,7 @@ COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#0
 DASHES = ("-", "--", ":", "-.")
 MARKERS = ("o", "s", "^", "D", "v", "<", ">")
 UPPER, LOWER, ACCENT = COLOURS[0], COLOURS[4], "#C00000"
-ERROR_MAP = colormaps["YlGnBu"]
+ERROR_MAP = "YlGnBu"
 FAILED = "not converged"  # last in every legend
 IN_DOUBT = "in doubt by its audits"
 MANY_POINTS = 40  # beyond, a curve carries a marker here and there only
@@ -95,7 +92,7 @@ def curve_style(number: int, points: int, markers: bool, dashes: str = "-") -> d
     return style
 
 
-def finish(figure: Figure, axes: Axes, title: str | None) -> None:
+def finish(figure: plotting.Figure, axes: plotting.Axes, title: str | None) -> None:
     """Add grid, title, and a legend above the axes."""
     axes.grid(True, color="0.92", linewidth=0.5)
     axes.set_axisbelow(True)
@@ -107,7 +104,7 @@ def finish(figure: Figure, axes: Axes, title: str | None) -> None:
         legend_outside(figure, [handles[number] for number in order], [labels[number] for number in order])
 
 
-def legend_outside(figure: Figure, handles: Sequence[Any], labels: Sequence[str], edge: str = "upper") -> None:
+def legend_outside(figure: plotting.Figure, handles: Sequence[Any], labels: Sequence[str], edge: str = "upper") -> None:
     """Add a legend at the edge of the paper, in as many columns as fit; the paper grows by its rows."""
     longest = max(map(letters, labels))
     width = figure.get_figwidth() / MILLIMETRE

@@ -7,9 +7,6 @@ from typing import Annotated, Any, Literal
 
 import numpy as np
 import pandas as pd
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
 from pydantic import Field
 
 from nlsolve.contracts.status import Status
@@ -19,6 +16,7 @@ from nlsolve.results.parameters import differing_parameters
 from nlsolve.results.selection import Names
 from nlsolve.results.verdicts import Run, cheapest, doubt, is_error, number, percent
 from nlsolve.series import Array
+from nlsolve.show import plotting
 from nlsolve.show.figures.base import BaseFigure
 from nlsolve.show.figures.cases import label_of, labelled, select
 from nlsolve.show.figures.style import ACCENT, COLOURS, IN_DOUBT, MARKERS, PAGE, axis_label, join, legend_outside
@@ -42,7 +40,7 @@ class TradeFigure(BaseFigure):
     def columns_of_runs(self) -> dict[str, Names]:
         return {**super().columns_of_runs(), "x": (self.x,), "y": (self.y,)}
 
-    def paint(self, figure: Figure, frames: Frames) -> None:
+    def paint(self, figure: plotting.Figure, frames: Frames) -> None:
         for column in (self.x, self.y):
             self.require(column, frames.runs, "runs")
         chosen = select(self, frames.runs)
@@ -60,7 +58,7 @@ class TradeFigure(BaseFigure):
         front = _front(runs[self.x].to_numpy(float), runs[self.y].to_numpy(float))
         axes.margins(0.06)
         axes.step(*front, where="post", color="0.35", linewidth=0.8, zorder=1)
-        handles.append(Line2D([], [], color="0.35", linewidth=0.8, label=FRONT))
+        handles.append(plotting.Line2D([], [], color="0.35", linewidth=0.8, label=FRONT))
         axes.grid(True, color="0.92", linewidth=0.5)
         axes.set_axisbelow(True)
         axes.set_title(join(self.title, *self._left_out(chosen, converged, runs)))
@@ -69,7 +67,7 @@ class TradeFigure(BaseFigure):
         if winners:
             legend_outside(figure, winners, [str(handle.get_label()) for handle in winners], "lower")
 
-    def _points(self, axes: Axes, runs: pd.DataFrame) -> list[Any]:
+    def _points(self, axes: plotting.Axes, runs: pd.DataFrame) -> list[Any]:
         """Draw the marks by group; returns their entries of the legend."""
         handles: list[Any] = []
         doubted = runs.apply(lambda run: bool(doubt(run)), axis=1).to_numpy(bool)
@@ -85,7 +83,7 @@ class TradeFigure(BaseFigure):
                 )
                 axes.plot(which[self.x], which[self.y], **style, **face)
             if label:
-                handles.append(Line2D([], [], label=label, **style))
+                handles.append(plotting.Line2D([], [], label=label, **style))
         if doubted.any():
             hollow_mark: Any = {
                 "linestyle": "none",
@@ -94,10 +92,10 @@ class TradeFigure(BaseFigure):
                 "color": "0.35",
                 "markersize": 5,
             }
-            handles.append(Line2D([], [], label=IN_DOUBT, **hollow_mark))
+            handles.append(plotting.Line2D([], [], label=IN_DOUBT, **hollow_mark))
         return handles
 
-    def _winners(self, axes: Axes, runs: pd.DataFrame) -> list[Any]:
+    def _winners(self, axes: plotting.Axes, runs: pd.DataFrame) -> list[Any]:
         """Draw a ring and a line for each target; returns entries of the legend with the names of the cheapest runs."""
         candidates, words = rows_of(runs), differing_parameters(runs)
         handles = []
@@ -107,11 +105,11 @@ class TradeFigure(BaseFigure):
             ring |= {"markersize": 9 + 3 * place, "markeredgewidth": 1.1, "zorder": 4}
             goal = percent(target) if is_error(self.y) else f"{target:g}"
             if best is None:
-                handles.append(Line2D([], [], linestyle="none", label=f"{goal}: no run reaches it"))
+                handles.append(plotting.Line2D([], [], linestyle="none", label=f"{goal}: no run reaches it"))
                 continue
             axes.axhline(target, color=ACCENT, linewidth=0.5, linestyle=(0, (1, 3)), zorder=1)
             axes.plot([best[self.x]], [best[self.y]], **ring)
-            handles.append(Line2D([], [], label=f"{goal}: {self._name(best, words)}", **ring))
+            handles.append(plotting.Line2D([], [], label=f"{goal}: {self._name(best, words)}", **ring))
         return handles
 
     def _name(self, run: Run, words: Sequence[str]) -> str:

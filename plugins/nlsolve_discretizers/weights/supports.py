@@ -8,7 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.spatial import cKDTree
+import scipy
 
 from nlsolve.plugin import SolveError, Status
 
@@ -45,7 +45,7 @@ class Supports:
             raise SolveError(
                 Status.BAD_CLOUD, f"a support of {largest} neighbours was asked for among {len(sources)} points"
             )
-        tree = cKDTree(sources)
+        tree = scipy.spatial.cKDTree(sources)
         distance, index = tree.query(targets, np.arange(1, largest + 2))
         plain = cls._of(distance, index, counts)
         if not balanced:
@@ -71,7 +71,7 @@ class Supports:
     @classmethod
     def within(cls, sources: np.ndarray, targets: np.ndarray, radius: float) -> Supports:
         """All sources nearer than `radius`."""
-        tree = cKDTree(sources)
+        tree = scipy.spatial.cKDTree(sources)
         count = np.maximum(tree.query_ball_point(targets, radius, return_length=True), 1)
         distance, index = tree.query(targets, np.arange(1, int(count.max()) + 1))
         farthest = distance[np.arange(len(targets)), count - 1]

@@ -14,8 +14,8 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+import scipy
 import scipy.sparse as sp
-from scipy.spatial import Delaunay, QhullError
 
 from nlsolve.plugin import Cloud, PointOperators, SolveError, Status
 
@@ -38,8 +38,8 @@ class Triangles:
         Raises SolveError (bad cloud) if the nodes lie on one line or a node belongs to no triangle.
         """
         try:
-            corners = Delaunay(cloud.nodes).simplices
-        except QhullError as error:
+            corners = scipy.spatial.Delaunay(cloud.nodes).simplices
+        except scipy.spatial.QhullError as error:
             raise SolveError(Status.BAD_CLOUD, "the nodes lie on one line: they span no triangles") from error
         group = np.zeros(len(cloud.nodes), dtype=int)
         for number, members in enumerate(cloud.boundaries.values(), start=1):

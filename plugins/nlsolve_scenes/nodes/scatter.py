@@ -11,8 +11,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 
 import numpy as np
+import scipy
 from numpy.random import Generator
-from scipy.spatial import cKDTree
 
 from nlsolve.plugin import Cloud, SolveError, Status
 
@@ -35,7 +35,7 @@ def scatter(walls: Mapping[str, np.ndarray], inside: Function, spacing: Function
     spacing : h (P,) [mm] at points (P, 2).
     """
     wall = np.concatenate(list(walls.values()))
-    wall_tree = cKDTree(wall)
+    wall_tree = scipy.spatial.cKDTree(wall)
 
     def allowed(points: np.ndarray) -> np.ndarray:
         return inside(points) & (wall_tree.query(points)[0] > FROM_WALL * spacing(points))
@@ -86,7 +86,7 @@ def _placed(wall: np.ndarray, inside: Function, allowed: Function, spacing: Func
 def _pushes(nodes: np.ndarray, wall: np.ndarray, spacing: Function) -> np.ndarray:
     """Σ_j max(0, 1.2 h − |x_i − x_j|) (x_i − x_j)/|x_i − x_j| over all neighbours, the walls' too, (F, 2) [mm]."""
     everyone = np.concatenate([nodes, wall])
-    distance, index = cKDTree(everyone).query(nodes, 1 + min(NEIGHBOURS, len(everyone) - 1))
+    distance, index = scipy.spatial.cKDTree(everyone).query(nodes, 1 + min(NEIGHBOURS, len(everyone) - 1))
     h = spacing(everyone)
     bar = BAR * 0.5 * (h[: len(nodes), None] + h[index[:, 1:]])
     away = (nodes[:, None] - everyone[index[:, 1:]]) / distance[:, 1:, None]

@@ -6,14 +6,12 @@ from typing import Any, Literal
 
 import numpy as np
 import pandas as pd
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
+import scipy
 from pydantic import Field
-from scipy.spatial import cKDTree
 
 from nlsolve.results.frames import Frames
 from nlsolve.series import Array
+from nlsolve.show import plotting
 from nlsolve.show.figures.nodes.panels import PanelsFigure, layer_names, panels_of, snapshots_of
 from nlsolve.show.figures.nodes.sections import boundaries
 from nlsolve.show.figures.style import ACCENT, COLOURS, legend_outside
@@ -32,7 +30,7 @@ class CloudFigure(PanelsFigure):
     kind: Literal["cloud"] = "cloud"
     probe: tuple[float, float] | None = Field(None, description="place at t = 0 whose nearest node is marked [mm]")
 
-    def paint(self, figure: Figure, frames: Frames) -> None:
+    def paint(self, figure: plotting.Figure, frames: Frames) -> None:
         snapshots = snapshots_of(self, frames, ("x", "y", "x0", "y0"))
         apart, over = self.layers(snapshots)
         for axes, snapshot in panels_of(figure, self, apart, bar=False):
@@ -41,15 +39,17 @@ class CloudFigure(PanelsFigure):
                 places = _material(layer.rows)[["x", "y"]].to_numpy(float)
                 axes.plot(*places.T, markersize=2.0 * _marker_size(axes, places), **OVER)
         dot: Any = {"linestyle": "none", "marker": "o"}
-        handles = [Line2D([], [], color=colour, markeredgewidth=0, label=label, **dot) for label, colour in HALVES]
-        handles.append(Line2D([], [], color="white", markeredgecolor="black", label="boundary", **dot))
-        handles += [Line2D([], [], label=name, **OVER) for name in layer_names(apart[0], over)]
+        handles = [
+            plotting.Line2D([], [], color=colour, markeredgewidth=0, label=label, **dot) for label, colour in HALVES
+        ]
+        handles.append(plotting.Line2D([], [], color="white", markeredgecolor="black", label="boundary", **dot))
+        handles += [plotting.Line2D([], [], label=name, **OVER) for name in layer_names(apart[0], over)]
         if self.probe is not None:
-            handles.append(Line2D([], [], markersize=6, label="probe", **dot, **RING))
+            handles.append(plotting.Line2D([], [], markersize=6, label="probe", **dot, **RING))
         off_the_title = "lower" if figure.get_suptitle() else "upper"
         legend_outside(figure, handles, [str(handle.get_label()) for handle in handles], off_the_title)
 
-    def _nodes(self, axes: Axes, rows: pd.DataFrame) -> None:
+    def _nodes(self, axes: plotting.Axes, rows: pd.DataFrame) -> None:
         nodes, rows = rows[["x", "y"]].to_numpy(float), _material(rows)
         places, start = rows[["x", "y"]].to_numpy(float), rows[["x0", "y0"]].to_numpy(float)
         wall, upper = boundaries(rows) != "", start[:, 1] > 0
@@ -71,12 +71,12 @@ def _material(rows: pd.DataFrame) -> pd.DataFrame:
     return rows[marked].assign(x=rows["marker_x"], y=rows["marker_y"])
 
 
-def _marker_size(axes: Axes, places: Array) -> float:
+def _marker_size(axes: plotting.Axes, places: Array) -> float:
     """Diameter in points: half the typical distance between neighbours as it will be printed."""
-    spacing = float(np.median(cKDTree(places).query(places, 2)[0][:, 1]))
+    spacing = float(np.median(scipy.spatial.cKDTree(places).query(places, 2)[0][:, 1]))
     left, right = axes.get_xlim()
     figure = axes.get_figure()
-    assert isinstance(figure, Figure)
+    assert isinstance(figure, plotting.Figure)
     columns = axes.get_gridspec().ncols  # type: ignore[union-attr]
     printed = 0.8 * figure.get_figwidth() / columns * 72 / (right - left) * spacing
     return float(np.clip(0.55 * printed, 0.5, 4))

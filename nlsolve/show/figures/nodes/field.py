@@ -5,16 +5,11 @@ from __future__ import annotations
 from typing import Any, Literal
 
 import numpy as np
-from matplotlib.collections import LineCollection
-from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
-from matplotlib.patches import Patch
-from matplotlib.ticker import FixedLocator, FuncFormatter, MaxNLocator
-from matplotlib.tri import Triangulation
 from pydantic import Field
 
 from nlsolve.results.frames import Frames
 from nlsolve.series import Array
+from nlsolve.show import plotting
 from nlsolve.show.figures.nodes.panels import PanelsFigure, Snapshot, layer_names, panels_of, snapshots_of
 from nlsolve.show.figures.nodes.sections import outline, triangulate
 from nlsolve.show.figures.style import DASHES, axis_label, legend_outside
@@ -34,7 +29,7 @@ class FieldFigure(PanelsFigure):
         None, gt=0, description="largest magnitude the colours distinguish; absent: the largest"
     )
 
-    def paint(self, figure: Figure, frames: Frames) -> None:
+    def paint(self, figure: plotting.Figure, frames: Frames) -> None:
         if self.log and self.value != "rate":
             raise self.refuse(f"value = {self.value!r} has a sign, so log = true cannot show it; only 'rate' can")
         snapshots = snapshots_of(self, frames, ("x", "y", self.value))
@@ -49,7 +44,7 @@ class FieldFigure(PanelsFigure):
             contours = axes.tricontourf(triangles, shown, levels=levels, cmap=colours, extend=extend)
             contours.set_edgecolor("face")  # hides the seams that PDF viewers draw between bands
             contours.set_linewidth(0.2)
-            axes.add_collection(LineCollection(list(outline(triangles)), colors="0.25", linewidths=0.5))
+            axes.add_collection(plotting.LineCollection(list(outline(triangles)), colors="0.25", linewidths=0.5))
             for layer, line in zip(over, outlines, strict=True):
                 every = {"colors": line["color"], "linewidths": line["linewidth"], "linestyles": line["linestyle"]}
                 axes.tricontour(*self._shown(layer, levels[0]), levels=levels[:: LEVELS // 5], **every)
@@ -58,16 +53,16 @@ class FieldFigure(PanelsFigure):
         bar.set_label(axis_label([self.value], "fields"))
         bar.ax.tick_params(direction="out", right=True)
         bar.outline.set_linewidth(0.5)
-        ticks = MaxNLocator(7, integer=self.log, steps=[1, 2, 5, 10]).tick_values(levels[0], levels[-1])
-        bar.locator = FixedLocator([tick for tick in ticks if levels[0] <= tick <= levels[-1]])
+        ticks = plotting.MaxNLocator(7, integer=self.log, steps=[1, 2, 5, 10]).tick_values(levels[0], levels[-1])
+        bar.locator = plotting.FixedLocator([tick for tick in ticks if levels[0] <= tick <= levels[-1]])
         if self.log:
-            bar.formatter = FuncFormatter(lambda power, _: f"$10^{{{power:.0f}}}$")
+            bar.formatter = plotting.FuncFormatter(lambda power, _: f"$10^{{{power:.0f}}}$")
         bar.update_ticks()
         if over:
-            handles = [Patch(color="0.8"), *(Line2D([], [], **line) for line in outlines)]
+            handles = [plotting.Patch(color="0.8"), *(plotting.Line2D([], [], **line) for line in outlines)]
             legend_outside(figure, handles, [apart[0].label, *layer_names(apart[0], over)], "lower")
 
-    def _shown(self, snapshot: Snapshot, lowest: float) -> tuple[Triangulation, Array]:
+    def _shown(self, snapshot: Snapshot, lowest: float) -> tuple[plotting.Triangulation, Array]:
         """The triangles of a cloud, and the value at its nodes, `lowest` where there is none."""
         value = snapshot.rows[self.value].to_numpy(float)
         shown = np.where(np.isfinite(value), value, lowest)

@@ -7,11 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 from pydantic import Field
 
 from nlsolve.results.frames import Frames
+from nlsolve.show import plotting
 from nlsolve.show.figures.base import BaseFigure, listing
 from nlsolve.show.figures.cases import ending, labelled, select
 from nlsolve.show.figures.style import COLUMN, MILLIMETRE, PAGE, axis_label, bracketed, join
@@ -63,7 +62,7 @@ def layer_names(first: Snapshot, over: Sequence[Snapshot]) -> list[str]:
     return [layer.label if layer.note == first.note else layer.heading for layer in over]
 
 
-Panel = tuple[Axes, Snapshot]
+Panel = tuple["plotting.Axes", Snapshot]
 
 
 def snapshots_of(spec: NodesFigure, frames: Frames, columns: Sequence[str]) -> list[Snapshot]:
@@ -101,7 +100,7 @@ def _half_increment(run: pd.Series, time: float) -> float:
     return 0.5 * (1 + 1e-6) * float(increment) if np.isfinite(increment) else 1e-9 * time
 
 
-def panels_of(figure: Figure, spec: PanelsFigure, snapshots: Sequence[Snapshot], bar: bool) -> list[Panel]:
+def panels_of(figure: plotting.Figure, spec: PanelsFigure, snapshots: Sequence[Snapshot], bar: bool) -> list[Panel]:
     """Panels of equal aspect, one a case, on paper of a fitting height; returns those whose case has nodes."""
     if len(snapshots) > MOST_PANELS:
         raise spec.refuse(f"{len(snapshots)} cases are too many panels; choose at most {MOST_PANELS} with `where`")

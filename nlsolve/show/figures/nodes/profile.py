@@ -6,12 +6,12 @@ from typing import Literal
 
 import numpy as np
 import pandas as pd
-from matplotlib.figure import Figure
 from pydantic import Field
 
 from nlsolve.results.columns import FIELDS
 from nlsolve.results.frames import Frames
 from nlsolve.series import Array
+from nlsolve.show import plotting
 from nlsolve.show.figures.nodes.panels import NodesFigure, snapshots_of
 from nlsolve.show.figures.nodes.sections import slice_triangles, triangulate
 from nlsolve.show.figures.style import axis_label, curve_style, finish, join
@@ -26,7 +26,7 @@ class ProfileFigure(NodesFigure):
     value: Literal["u", "v", "exx", "eyy", "exy", "rate"] = Field(description="column of `fields`")
     log: bool = Field(False, description="logarithmic vertical axis")
 
-    def paint(self, figure: Figure, frames: Frames) -> None:
+    def paint(self, figure: plotting.Figure, frames: Frames) -> None:
         snapshots = snapshots_of(self, frames, ("x", "y", self.value))
         axes = figure.add_subplot()
         axes.set_yscale("log" if self.log else "linear")

@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from matplotlib.tri import Triangulation
 from numpy.typing import NDArray
 
 from nlsolve.series import Array
+from nlsolve.show import plotting
 
 
 def boundaries(rows: pd.DataFrame) -> NDArray[Any]:
@@ -20,11 +20,11 @@ def boundaries(rows: pd.DataFrame) -> NDArray[Any]:
     return rows["boundary"].astype(object).fillna("").astype(str).to_numpy()
 
 
-def triangulate(rows: pd.DataFrame, value: Array | None = None) -> Triangulation:
+def triangulate(rows: pd.DataFrame, value: Array | None = None) -> plotting.Triangulation:
     """Delaunay triangles of the cloud. Masked: those between nodes of one boundary group (holes, and slivers along the
     hull), those without area, and those with a node whose value is not finite."""
     x, y = rows["x"].to_numpy(float), rows["y"].to_numpy(float)
-    triangulation = Triangulation(x, y)
+    triangulation = plotting.Triangulation(x, y)
     corners = triangulation.triangles
     group = boundaries(rows)[corners]
     hole = (group[:, 0] != "") & (group == group[:, :1]).all(axis=1)
@@ -36,7 +36,7 @@ def triangulate(rows: pd.DataFrame, value: Array | None = None) -> Triangulation
     return triangulation
 
 
-def outline(triangulation: Triangulation) -> Array:
+def outline(triangulation: plotting.Triangulation) -> Array:
     """Edges of a single unmasked triangle, shape (E, 2, 2): the walls."""
     corners = triangulation.get_masked_triangles()
     edges = np.sort(np.concatenate([corners[:, [0, 1]], corners[:, [1, 2]], corners[:, [2, 0]]]), axis=1)
@@ -44,7 +44,9 @@ def outline(triangulation: Triangulation) -> Array:
     return np.stack([triangulation.x, triangulation.y], axis=1)[pairs[counts == 1]]
 
 
-def slice_triangles(triangulation: Triangulation, along: Array, across: Array, value: Array) -> tuple[Array, Array]:
+def slice_triangles(
+    triangulation: plotting.Triangulation, along: Array, across: Array, value: Array
+) -> tuple[Array, Array]:
     """The piecewise linear interpolant of nodal values on the line across = 0: places and values, NaN between pieces.
 
     Every crossed triangle contributes its straight piece, so the result is exact whatever the resolution of the cloud;
