@@ -15,11 +15,17 @@ from nlsolve.cli.endings import ExitCode, ending
 from nlsolve.cli.folders import folders
 from nlsolve.cli.options import (
     Disabled,
+    Failed,
+    Jobs,
     Json,
+    Only,
     Out,
     PluginFiles,
     Quick,
+    Retry,
     Settings,
+    Shard,
+    Skip,
     StudyFile,
     checked_study,
     default_folder,
@@ -41,10 +47,8 @@ from nlsolve.registry.problems import StudyError, did_you_mean
 from nlsolve.results.aggregates import shared_ways
 from nlsolve.results.frames import json_rows
 from nlsolve.running.diagnose import diagnose as diagnostics_of
-from nlsolve.running.forecast import ASSUMPTION, forecast
+from nlsolve.running.planning.plan import plan_of
 from nlsolve.running.runner import run as run_study
-from nlsolve.running.store.parts import Parts
-from nlsolve.running.store.standing import KEPT, standings_of
 from nlsolve.study.case import section_rows
 from nlsolve.study.keys.schema import study_schema
 
@@ -78,10 +82,7 @@ def run(
     plugin: PluginFiles = None,
     disable_plugin: Disabled = None,
     as_json: Json = False,
-    jobs: Annotated[
-        int | None,
-        typer.Option(help="cases at a time; default: the physical cores, but 1 for a study that says how it is timed"),
-    ] = None,
+    jobs: Jobs = None,
     isolation: Annotated[
         str | None,
         typer.Option(metavar="HOW", help="process: each case in a worker process, the default; none: all in this one"),
@@ -93,22 +94,11 @@ def run(
     scheduler: Annotated[
         str | None, typer.Option(metavar="ADDRESS", help="scheduler of the cluster; default: one of this machine")
     ] = None,
-    retry: Annotated[
-        list[str] | None, typer.Option(metavar="STATUS", help="run finished cases of this status again")
-    ] = None,
-    only: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar="EXPR", help="run only cases with solver.kind=anm (or a pattern), a status, or a case's id"
-        ),
-    ] = None,
-    skip: Annotated[list[str] | None, typer.Option(metavar="EXPR", help="leave these cases out, as --only")] = None,
-    failed: Annotated[
-        bool, typer.Option("--failed", help="run again only what crashed or was stopped at a limit")
-    ] = False,
-    shard: Annotated[
-        str | None, typer.Option(metavar="I/N", help="run every N-th case from the I-th on, for batch arrays")
-    ] = None,
+    retry: Retry = None,
+    only: Only = None,
+    skip: Skip = None,
+    failed: Failed = False,
+    shard: Shard = None,
 ) -> None:
     """Run a study, or the part of it that is not yet in the results folder."""
     folder = out or default_folder(study, quick)
@@ -176,25 +166,31 @@ def plan(
     plugin: PluginFiles = None,
     disable_plugin: Disabled = None,
     as_json: Json = False,
+    jobs: Jobs = None,
+    retry: Retry = None,
+    only: Only = None,
+    skip: Skip = None,
+    failed: Failed = False,
+    shard: Shard = None,
 ) -> None:
-    """List the cases of a study, which of them are to be run and why, and forecast what they cost."""
+    """List the cases of a study, which of them `run` would compute and why, and forecast how long that takes."""
     folder = out or default_folder(study, quick)
     with ending():
         checked = checked_study(study, settings, quick, plugin, disable_plugin)
-        words = standings_of(Parts(folder), checked)
-        frame = forecast(checked)
-    frame.insert(1, "plan", frame["case"].map(words))
+        planned = plan_of(checked, folder, statuses(retry or []), only or [], skip or [], failed, shard, jobs)
+    frame = planned.cases
     if as_json:
-        typer.echo(json.dumps({"assumption": ASSUMPTION, "folder": str(folder), "cases": json_rows(frame)}))
+        told = {"assumption": planned.basis, "seconds": planned.seconds, "jobs": planned.jobs, "folder": str(folder)}
+        typer.echo(json.dumps({**to_jsonable_python(told), "cases": json_rows(frame)}))
         return
     swept = list(dict.fromkeys(name for case in checked.cases for name in case.swept))
-    sizes = ["increments", "nodes", "unknowns", "seconds_factorization", "seconds_start", "seconds", "seconds_all"]
+    sizes = ["increments", "nodes", "unknowns", "seconds_factorization", "seconds_start", "seconds", "seconds_expected"]
     say_excluded(checked)
     print_frame(count(len(frame)), frame[["case", "plan", *swept, *sizes]])
-    left = frame[frame["plan"] != KEPT]
-    told = ", ".join(f"{number} {word}" for word, number in frame["plan"].value_counts().items())
-    typer.echo(f"{told} (results in {folder})")
-    typer.echo(f"{left['seconds_all'].sum() * checked.timing.rounds:.3g} s to run {count(len(left))} ({ASSUMPTION})")
+    words = ", ".join(f"{number} {word}" for word, number in frame["plan"].value_counts().items()) or "none chosen"
+    typer.echo(f"{words} (results in {folder})")
+    side_by_side = f", {planned.jobs} at a time" if planned.jobs > 1 else ""
+    typer.echo(f"{planned.seconds:.3g} s to run {count(len(planned.left))}{side_by_side} ({planned.basis})")
 
 
 @app.command()

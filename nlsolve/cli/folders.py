@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import shlex
 from pathlib import Path
 from typing import Annotated
 
@@ -23,8 +22,8 @@ from nlsolve.cli.options import (
 )
 from nlsolve.cli.printing import count, print_table, say
 from nlsolve.registry.problems import StudyError, did_you_mean
+from nlsolve.running.packing.pack import export as packed
 from nlsolve.running.store.reading import FolderStatus, read_tables, status_of_folder
-from nlsolve.running.store.upkeep import export as packed
 from nlsolve.running.store.upkeep import merge_folders, remove, superfluous
 from nlsolve.show.tables import build
 
@@ -131,12 +130,12 @@ def export(
     disable_plugin: Disabled = None,
     to: Annotated[Path | None, typer.Option(metavar="FILE", help="the zip; default: NAME.zip")] = None,
 ) -> None:
-    """Pack a study, the files of nodes it reads, the versions of plugins, and its results into one zip to rerun."""
+    """Pack a study, plugins of one file, files of nodes, versions and results into one zip that can be run again."""
     folder, target = out or default_folder(study, quick), to or Path(f"{study.stem}.zip")
     options = [word for setting in settings or [] for word in ("--set", setting)] + ["--quick"] * quick
     with ending():
         checked = checked_study(study, settings, quick, plugin, disable_plugin)
-        missing = packed(checked, study.read_text(encoding="utf-8"), shlex.join(options), folder, target)
+        missing = packed(checked, study, options, folder, target, plugin or [])
     for path in missing:
         say(f"{path} is not in the zip: the study must name it by a path within the folder it is run in")
     typer.echo(f"{target}: {target.stat().st_size / 1e6:.3g} MB")

@@ -27,6 +27,27 @@ Disabled = Annotated[
     list[str] | None,
     typer.Option("--disable-plugin", metavar="NAME", help="a plugin, or a package of plugins, that is not imported"),
 ]
+Retry = Annotated[
+    list[str] | None, typer.Option("--retry", metavar="STATUS", help="run finished cases of this status again")
+]
+Only = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--only", metavar="EXPR", help="run only cases with solver.kind=anm (or a pattern), a status, or a case's id"
+    ),
+]
+Skip = Annotated[list[str] | None, typer.Option("--skip", metavar="EXPR", help="leave these cases out, as --only")]
+Failed = Annotated[bool, typer.Option("--failed", help="run again only what crashed or was stopped at a limit")]
+Shard = Annotated[
+    str | None,
+    typer.Option("--shard", metavar="I/N", help="run every N-th case from the I-th on, for batch arrays"),
+]
+Jobs = Annotated[
+    int | None,
+    typer.Option(
+        "--jobs", help="cases at a time; default: the physical cores, but 1 for a study that says how it is timed"
+    ),
+]
 Json = Annotated[bool, typer.Option("--json", help="machine-readable output")]
 
 

@@ -220,5 +220,7 @@ def _show(store: Store, study: Study, frames: Frames) -> tuple[str, ...]:
                 notes.append(str(error))
         captions = [(spec.name, spec.caption) for spec in study.figures]
         environments = environments_of(store.parts, frames.runs)
-        write_report(store.folder, study.question, shown, captions, frames.runs, environments)
+        left_out = [(excluded.label, excluded.reason) for excluded in study.excluded]
+        findings = Results(study, frames.runs, frames.steps, frames.fields).findings
+        write_report(store.folder, study.question, shown, captions, frames.runs, environments, findings, left_out)
     return tuple(notes)

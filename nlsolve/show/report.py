@@ -17,6 +17,7 @@ from nlsolve.contracts.status import Status
 from nlsolve.results.aggregates import shared_ways
 from nlsolve.results.parameters import differing_parameters
 from nlsolve.results.verdicts import AT_A_SOLUTION
+from nlsolve.show.expectations import Finding
 
 PRINTED_DOTS_PER_INCH = 200  # of the PNGs, see nlsolve.show.figures
 SCREEN_DOTS_PER_INCH = 110
@@ -30,12 +31,16 @@ def write_report(
     figures: Sequence[tuple[str, str]],
     runs: pd.DataFrame,
     environments: Mapping[str, Mapping[str, str]] | None = None,
+    findings: Sequence[Finding] = (),
+    excluded: Sequence[tuple[str, str]] = (),
 ) -> Path:
     """Write folder/report.html and return its path.
 
     tables : name -> DataFrame, or its HTML, which is trusted; everything else is escaped.
     figures : (name, caption); figures/NAME.png in the folder is linked, and a missing one is said to be missing.
     environments : what rows were computed with, by its name in their column `environment`.
+    findings : what the study expects to find, judged.
+    excluded : (label, reason) of each case that the study leaves out.
     """
     failed = runs[[status not in AT_A_SOLUTION for status in runs["status"].map(Status.of)]]
     parameters = differing_parameters(runs)
@@ -47,6 +52,8 @@ def write_report(
         cases=len(runs),
         ways=shared_ways(runs),
         endings=[{"word": word, "count": count} for word, count in runs["status"].value_counts().items()],
+        findings=findings,
+        excluded=grouped_by_reason(excluded),
         tables={name: _table(table) for name, table in tables.items()},
         parameters=parameters,
         failures=[
@@ -68,6 +75,14 @@ def write_report(
     draft.write_text(page, encoding="utf-8")
     draft.replace(path)
     return path
+
+
+def grouped_by_reason(excluded: Sequence[tuple[str, str]]) -> dict[str, list[str]]:
+    """Reason -> the cases that are left out because of it."""
+    found: dict[str, list[str]] = {}
+    for label, reason in excluded:
+        found.setdefault(reason, []).append(label)
+    return found
 
 
 def machine_facts() -> dict[str, str]:

@@ -186,7 +186,8 @@ def test_plan_says_what_is_run_and_why(tmp_path, monkeypatch):
     nlsolve("run", path, "--out", "o", "--set", 'sweep=[{grid={"solver.order"=[10],"solver.tolerance"=[1e-6]}}]')
     told = nlsolve("plan", path, "--out", "o")
     assert "3 new, 1 kept (results in o)" in told.stdout
-    assert "s to run 3 cases (forecast" in told.stdout
+    assert "s to run 3 cases" in told.stdout
+    assert "(forecast: from the seconds of 1 case of this study" in told.stdout
     document = json.loads(nlsolve("plan", path, "--out", "o", "--json").stdout)
     assert document["folder"] == "o"
     assert [row["plan"] for row in document["cases"]] == ["kept", "new", "new", "new"]

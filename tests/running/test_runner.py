@@ -16,10 +16,9 @@ import nlsolve
 from nlsolve.plugin import InputFile
 from nlsolve.registry.problems import StudyError
 from nlsolve.results.columns import FIELDS, RUNS, STEPS
+from nlsolve.running.planning.plan import plan_of
 from nlsolve.running.runner import Event, Results, run
 from nlsolve.running.store.identity import identity_of
-from nlsolve.running.store.parts import Parts
-from nlsolve.running.store.standing import standings_of
 from nlsolve.running.store.store import Store
 from nlsolve.study.study import Study
 
@@ -219,7 +218,7 @@ def test_a_case_whose_file_changes_while_it_runs_is_not_kept(tmp_path, monkeypat
 
     monkeypatch.setattr("nlsolve.running.engines.execution.run_case", march)
     assert len(run(study, tmp_path / "out").runs) == 4
-    words = standings_of(Parts(tmp_path / "out"), study)
+    words = dict(plan_of(study, tmp_path / "out").cases[["case", "plan"]].to_numpy())
     assert list(words.values()) == ["new", "kept", "kept", "kept"], "the first case began with the old file"
 
 

@@ -12,6 +12,7 @@ import pandas as pd
 import pytest
 
 from nlsolve.contracts.status import Status
+from nlsolve.show.expectations import Finding
 from nlsolve.show.figures import LineFigure, draw, save
 from nlsolve.show.report import machine_facts, write_report
 
@@ -102,3 +103,19 @@ def test_unwritable_folder_is_the_callers_error(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     with pytest.raises(OSError, match="file"):
         write_report(tmp_path / "file" / "out", "?", {}, [], RUNS)
+
+
+def test_findings_and_cases_that_were_left_out_are_on_the_page(tmp_path: Path) -> None:
+    findings = [
+        Finding("Order 20 <needs> few tangents.", ""),
+        Finding("So does 10.", "tangents is 88, not 2"),
+    ]
+    excluded = [(f"p = {number}", "No order > 40 is worth it.") for number in range(41, 64)]
+    page = write_report(tmp_path, "?", {}, [], RUNS, findings=findings, excluded=[("newton", "Too slow."), *excluded])
+    text = page.read_text(encoding="utf-8")
+    assert "<li>Order 20 &lt;needs&gt; few tangents. <strong>It holds.</strong></li>" in text
+    assert "<strong>It does not hold: tangents is 88, not 2.</strong>" in text
+    assert "<li>Too slow. 1 case: newton</li>" in text
+    assert "<li>No order &gt; 40 is worth it. 23 cases: p = 41; p = 42" in text
+    assert "p = 60; …</li>" in text
+    assert "Findings" not in write_report(tmp_path, "?", {}, [], RUNS).read_text(encoding="utf-8")

@@ -65,9 +65,7 @@ def engine_for(
         here = InProcess()
         here.note("this system has no process groups: the cases were run in this process, without limits")
         return here
-    workers: Engine = import_module("nlsolve.running.engines.local").Workers(
-        jobs or (physical_cores() if timing == Timing() else 1)
-    )
+    workers: Engine = import_module("nlsolve.running.engines.local").Workers(jobs_here(timing, jobs))
     return workers
 
 
@@ -77,6 +75,11 @@ def _on_cluster(jobs: int | None, scheduler: str | None) -> Engine:
     here = None if scheduler is not None else physical_cores()
     engine: Engine = import_module("nlsolve.running.engines.cluster").Cluster(jobs or here, scheduler)
     return engine
+
+
+def jobs_here(timing: Timing, jobs: int | None = None) -> int:
+    """Cases at a time on this machine: `jobs`; by default the physical cores, but one where it is said how to time."""
+    return jobs or (physical_cores() if timing == Timing() else 1)
 
 
 def physical_cores() -> int:

@@ -12,6 +12,7 @@ A part whose JSON is there is complete. Every file is written beside its place a
 from __future__ import annotations
 
 import json
+import math
 import os
 import secrets
 import time
@@ -55,6 +56,7 @@ class Entry:
     measured : its row of `runs` without parameters; parameters : those, and the names of settings it was first run by.
     frames : name -> size [bytes] of each frame that has a file.
     written : when, in seconds since 1970.
+    elapsed : seconds from the start of the case until it was written [s]; NaN where that is not known.
     """
 
     identity: Identity
@@ -62,6 +64,7 @@ class Entry:
     parameters: Row
     frames: Mapping[str, int]
     written: float
+    elapsed: float = math.nan
 
     def run(self, names: Mapping[str, str]) -> Row:
         """The row of `runs` under other names of settings."""
@@ -109,8 +112,8 @@ class Parts:
             return None
         return steps, fields
 
-    def save(self, identity: Identity, part: Part, parameters: Mapping[str, Any]) -> None:
-        """Write a part. Its JSON is written last."""
+    def save(self, identity: Identity, part: Part, parameters: Mapping[str, Any], elapsed: float = math.nan) -> None:
+        """Write a part. Its JSON is written last. elapsed : see `Entry`."""
         measured = {name: value for name, value in part.run.items() if name not in {"case", *parameters}}
         sizes = {}
         for name, frame in (("steps", part.steps), ("fields", part.fields)):
@@ -131,6 +134,7 @@ class Parts:
             "parameters": dict(parameters),
             "frames": sizes,
             "written": time.time(),
+            **({"elapsed": elapsed} if math.isfinite(elapsed) else {}),
         }
         write_text(self.folder, self.folder / CASES / f"{identity.key}.json", json.dumps(held, default=_plain))
 

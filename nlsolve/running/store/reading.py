@@ -178,7 +178,8 @@ def status_of_folder(folder: Path) -> FolderStatus:
 def shown_of(study: Study, entries: Iterable[Entry]) -> str:
     """A digest of all that the tables, figures and report of a study are made from."""
     rows = [[entry.identity.key, entry.written] for entry in entries]
-    views = [describe(study, {}), [repr(figure) for figure in study.figures], rows, source_of(VIEWS)]
+    told = [repr(thing) for thing in (*study.figures, *study.expectations, *study.excluded)]
+    views = [describe(study, {}), told, rows, source_of(VIEWS)]
     return fingerprint(json.dumps(views).encode())
 
 

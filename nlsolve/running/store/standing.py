@@ -15,7 +15,6 @@ from nlsolve.running.retry import is_final, is_tried_again
 from nlsolve.running.store.identity import Identity, case_of, identity_of
 from nlsolve.running.store.parts import Entry, Parts
 from nlsolve.study.case import Case
-from nlsolve.study.study import Study
 from nlsolve.study.timing import Timing
 
 KEPT, NEW, DAMAGED, TIMED = "kept", "new", "damaged", "timed again"
@@ -80,12 +79,6 @@ class Standings:
     def _latest(self, keys: Iterable[str]) -> Entry | None:
         found = [entry for entry in map(self.parts.entry, keys) if entry is not None]
         return max(found, key=lambda entry: entry.written, default=None)
-
-
-def standings_of(parts: Parts, study: Study, retry: Collection[Status] = ()) -> dict[str, str]:
-    """Case -> its word, for every case of a study."""
-    found = Standings(parts, study.timing, retry)
-    return {case.id: found.of(case).word for case in study.cases}
 
 
 def rounds_of(run: Mapping[str, Any], timing: Timing) -> int:

@@ -7,6 +7,8 @@ grows or changes finds there whatever still applies.
 from __future__ import annotations
 
 import json
+import math
+import time
 from collections.abc import Collection, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
@@ -59,6 +61,7 @@ class Store:
             (folder / CASES).mkdir(parents=True, exist_ok=True)
         self._claims = Claims(folder)
         self._standings = Standings(self.parts, study.timing, retry)
+        self._started: dict[str, float] = {}
         self._begun: dict[str, Identity] = {case.id: identity_of(case) for case in study.cases}
         self.write_text(STUDY, json.dumps(describe(study, self._begun), ensure_ascii=False) + "\n")
 
@@ -90,13 +93,17 @@ class Store:
     def begin(self, case: Case) -> bool:
         """Claim a case, so that no other run computes it; False while another run has it."""
         with self.writing():
-            return self._claims.take(identity_of(case).key)
+            taken = self._claims.take(identity_of(case).key)
+        if taken:
+            self._started[case.id] = time.monotonic()
+        return taken
 
     def save(self, case: Case, part: Part) -> None:
         """Keep a part. It is not kept when a file that the case reads has changed since the case was looked up."""
         identity = identity_of(case)
         if identity == self._begun[case.id]:
-            self.parts.save(identity, part, case.parameters)
+            elapsed = time.monotonic() - self._started.get(case.id, math.nan)
+            self.parts.save(identity, part, case.parameters, elapsed)
 
     def end(self, case: Case) -> None:
         """Give up the claim on a case."""

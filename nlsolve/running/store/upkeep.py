@@ -1,18 +1,17 @@
-"""Results folders put together, tidied up, and packed for somebody else."""
+"""Results folders put together and tidied up."""
 
 from __future__ import annotations
 
 import shutil
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
-from zipfile import ZIP_DEFLATED, ZipFile
 
 from nlsolve.contracts.status import STOPPED
 from nlsolve.results.verdicts import status_of
 from nlsolve.running.retry import TRIED_AGAIN
 from nlsolve.running.store.claims import CLAIMS, LOCK, claimed
-from nlsolve.running.store.identity import case_of, identity_of
+from nlsolve.running.store.identity import case_of
 from nlsolve.running.store.parts import (
     CASES,
     ENVIRONMENTS,
@@ -25,21 +24,6 @@ from nlsolve.running.store.parts import (
     writing,
 )
 from nlsolve.running.store.reading import STUDY, description_of, is_results_folder
-from nlsolve.study.study import Study
-
-HOW_TO_RERUN = """{question}
-
-study.toml     the study
-results/       its results: report.html shows them, cases/ has every case with the source and the files it depends on
-versions.txt   versions of nlsolve, of its plugins and of libraries where the cases were computed
-
-To run it again, install nlsolve and the plugins in these versions, and in this folder
-
-    nlsolve plan study.toml --out results{options}
-    nlsolve run study.toml --out results{options}
-
-The plan says which cases would be computed again, and why. With another folder behind --out all of them are.
-"""
 
 
 @dataclass(frozen=True)
@@ -138,51 +122,3 @@ def remove(folder: Path, files: Iterable[Path]) -> int:
             freed += path.stat().st_size
             path.unlink()
     return freed
-
-
-def export(study: Study, text: str, options: str, folder: Path, to: Path) -> list[Path]:
-    """Pack a study, the files it reads, versions and its results into a zip that somebody else can run again.
-
-    text : the study file; options : with which options it was run.
-    Returns the files that it reads but that are not in the zip, because their names lead out of the working folder.
-    Raises StoreError when nothing of the study is finished, or the zip cannot be written.
-    """
-    identities = [identity_of(case) for case in study.cases]
-    parts = Parts(folder)
-    entries = {key: entry for key in (each.key for each in identities) if (entry := parts.entry(key)) is not None}
-    if not entries:
-        raise StoreError(f"{folder}: nothing of this study is finished there: run it first")
-    read = sorted({Path(name) for identity in identities for name in identity.files})
-    packed = [path for path in read if path.is_file() and not path.is_absolute() and ".." not in path.parts]
-    names = {str(entry.measured.get("environment")) for entry in entries.values()}
-    environments = {name: parts.environment(name) for name in sorted(names)}
-    told = HOW_TO_RERUN.format(question=study.question, options=f" {options}" if options else "")
-    with writing(to.parent), replacing(to.parent, to) as temporary, ZipFile(temporary, "w", ZIP_DEFLATED) as pack:
-        pack.writestr("README.txt", told)
-        pack.writestr("study.toml", text)
-        pack.writestr("versions.txt", _versions(environments))
-        for path in packed:
-            pack.write(path, path.as_posix())
-        for path in _results_of(folder, entries, environments):
-            pack.write(path, f"results/{path.relative_to(folder).as_posix()}")
-    return [path for path in read if path not in packed]
-
-
-def _results_of(folder: Path, entries: Mapping[str, Entry], environments: Iterable[str]) -> list[Path]:
-    """The files of a results folder that belong to these parts, and what is shown of the study."""
-    shown = [
-        path
-        for path in folder.rglob("*")
-        if path.relative_to(folder).parts[0] not in (CASES, ENVIRONMENTS, WAYS, CLAIMS)
-    ]
-    kept = [folder / CASES / f"{key}{suffix}" for key in entries for suffix in (".json", ".txt")]
-    kept += [folder / CASES / f"{key}.{name}.parquet" for key, entry in entries.items() for name in entry.frames]
-    kept += [folder / ENVIRONMENTS / f"{name}.json" for name in environments]
-    return sorted(path for path in (*shown, *kept) if path.is_file() and not path.name.startswith("."))
-
-
-def _versions(environments: Mapping[str, Mapping[str, str]]) -> str:
-    lines = []
-    for name, environment in environments.items():
-        lines += [f"# environment {name}", *(f"{fact}: {value}" for fact, value in environment.items()), ""]
-    return "\n".join(lines)

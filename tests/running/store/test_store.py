@@ -11,10 +11,10 @@ from fakes import registry_of, write_study
 from nlsolve.contracts.status import Status
 from nlsolve.results.columns import RUNS
 from nlsolve.results.frames import Part
+from nlsolve.running.planning.plan import plan_of
 from nlsolve.running.store.identity import identity_of
-from nlsolve.running.store.parts import Parts, StoreError, merge
+from nlsolve.running.store.parts import StoreError, merge
 from nlsolve.running.store.reading import read_tables
-from nlsolve.running.store.standing import standings_of
 from nlsolve.running.store.store import Store
 from nlsolve.study.study import Study
 
@@ -98,7 +98,7 @@ def test_a_folder_remembers_all_its_cases_and_a_study_shows_its_own(tmp_path, st
     grown = Study.from_toml(write_study(tmp_path, ("[10, 20]", "[5, 10, 20]")), registry=registry_of())
 
     def words(study: Study) -> list[str]:
-        return list(standings_of(Parts(tmp_path / "out"), study).values())
+        return list(plan_of(study, tmp_path / "out").cases["plan"])
 
     assert words(grown) == ["new", "new", "kept", "kept", "kept", "kept"]
     assert words(asked) == ["kept"] * 4
@@ -144,11 +144,11 @@ def test_why_a_case_is_run(tmp_path, study):
     store.save(study.cases[1], part(study, 1, status="crashed"))
     store.save(study.cases[2], part(study, 2))
     (tmp_path / "out" / "cases" / f"{key(study, 2)}.steps.parquet").unlink()
-    words = list(standings_of(Parts(tmp_path / "out"), study).values())
+    words = list(plan_of(study, tmp_path / "out").cases["plan"])
     assert words == ["kept", "retried (crashed)", "damaged", "new"]
     timed = Study.from_toml(write_study(tmp_path), {"timing.rounds": 2}, registry=registry_of())
-    assert next(iter(standings_of(Parts(tmp_path / "out"), timed).values())) == "timed again"
-    assert next(iter(standings_of(Parts(tmp_path / "nowhere"), study).values())) == "new"
+    assert plan_of(timed, tmp_path / "out").cases["plan"][0] == "timed again"
+    assert plan_of(study, tmp_path / "nowhere").cases["plan"][0] == "new"
     assert not (tmp_path / "nowhere").exists()
 
 

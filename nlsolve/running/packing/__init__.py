@@ -1,0 +1,1 @@
+"""A study with all that it needs and its results, packed for somebody else."""

@@ -1,0 +1,89 @@
+"""How long cases will take, from those of the same study that have been run in the folder.
+
+log(t/t_p) = c + Σ_q a_q(value of q) + Σ_q b_q log|value of q| over the swept parameters q, fitted to the seconds t of
+the known cases by least squares with the penalty λ Σ (a² + b²). t_p is what the forecast from unit costs says, c the
+median. A value that no known case has counts by the slope b_q alone.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from nlsolve.series import Array
+from nlsolve.study.case import Case
+
+OVERHEAD = 0.05
+"""Seconds of a case beside its work, where none has been run yet: it is sent to a worker process and written [s]."""
+
+PENALTY = 0.05
+"""λ: a value that one known case has is taken for telling by all but this part."""
+
+MOST_VALUES = 40
+"""Number of values of a parameter up to which each has an effect of its own."""
+
+MOST_KNOWN = 1000
+"""Number of known cases that are looked at."""
+
+
+def seconds_expected(
+    cases: Sequence[Case], forecast: Mapping[str, float], known: Mapping[str, float]
+) -> dict[str, float]:
+    """Case -> seconds from its start until it is written [s]; NaN where neither known cases nor the forecast tell.
+
+    cases : all cases of a study.
+    forecast : case -> seconds of its work from unit costs [s]; NaN where they could not be measured.
+    known : case -> seconds that it took, of those that have been run [s].
+    """
+    prior = {case.id: forecast.get(case.id, math.nan) + OVERHEAD for case in cases}
+    if not known:
+        return prior
+    if not all(map(math.isfinite, prior.values())):
+        prior = dict.fromkeys(prior, 1.0)
+    chosen = [case for case in cases if case.id in known]
+    chosen = chosen[:: -(-len(chosen) // MOST_KNOWN)]
+    features = _Features(chosen)
+    ratios = np.log([max(known[case.id], 1e-3) / prior[case.id] for case in chosen])
+    mean = float(np.median(ratios))
+    x = features.of(chosen)
+    effects = np.linalg.solve(x.T @ x + PENALTY * np.eye(x.shape[1]), x.T @ (ratios - mean))
+    fitted = np.exp(mean + features.of(cases) @ effects)
+    expected = {case.id: prior[case.id] * float(ratio) for case, ratio in zip(cases, fitted, strict=True)}
+    return expected | {case.id: known[case.id] for case in cases if case.id in known}
+
+
+class _Features:
+    """The columns of the least squares: 1 where a case has a value, and centred logarithms of numbers."""
+
+    def __init__(self, cases: Sequence[Case]) -> None:
+        names = dict.fromkeys(name for case in cases for name in case.swept)
+        held = {name: list(dict.fromkeys(str(case.parameters.get(name)) for case in cases)) for name in names}
+        self._values = {name: values for name, values in held.items() if 1 < len(values) <= MOST_VALUES}
+        self._centres = {
+            name: float(np.mean([_logarithm(case.parameters.get(name)) for case in cases]))
+            for name, values in held.items()
+            if len(values) > 1 and all(math.isfinite(_logarithm(case.parameters.get(name))) for case in cases)
+        }
+
+    def of(self, cases: Sequence[Case]) -> Array:
+        """(cases, features)"""
+        return np.array([self._row(case.parameters) for case in cases]).reshape(len(cases), -1)
+
+    def _row(self, parameters: Mapping[str, Any]) -> list[float]:
+        row = []
+        for name, values in self._values.items():
+            value = str(parameters.get(name))
+            row += [float(value == known) for known in values]
+        for name, centre in self._centres.items():
+            slope = _logarithm(parameters.get(name)) - centre
+            row.append(slope if math.isfinite(slope) else 0.0)
+        return row
+
+
+def _logarithm(value: Any) -> float:
+    """log|value|; NaN for what is no number, and for 0."""
+    is_number = isinstance(value, int | float) and not isinstance(value, bool) and value
+    return math.log(abs(value)) if is_number else math.nan

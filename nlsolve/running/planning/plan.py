@@ -1,0 +1,81 @@
+"""What a run of a study would do with a results folder: which cases it would compute, why, and how long they take."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import dataclass
+from pathlib import Path
+
+import pandas as pd
+
+from nlsolve.contracts.status import Status
+from nlsolve.results.verdicts import status_of
+from nlsolve.running.engines.choice import jobs_here
+from nlsolve.running.forecast import ASSUMPTION, forecast
+from nlsolve.running.planning.experience import seconds_expected
+from nlsolve.running.portions.condition import LEFT
+from nlsolve.running.portions.portion import portion_of
+from nlsolve.running.store.parts import Parts
+from nlsolve.running.store.standing import KEPT, Standings
+from nlsolve.study.case import Case
+from nlsolve.study.study import Study
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What a run would do.
+
+    cases : one row for each case that the run is for: its word in `plan` (kept, new, …), its swept parameters, its
+        sizes and unit costs, and `seconds_expected`, from its start until it is written [s].
+    seconds : how long those to be computed take [s], `jobs` at a time.
+    basis : what the seconds rest on, in words.
+    """
+
+    cases: pd.DataFrame
+    seconds: float
+    jobs: int
+    basis: str
+
+    @property
+    def left(self) -> pd.DataFrame:
+        """The cases that would be computed."""
+        return self.cases[self.cases["plan"] != KEPT]
+
+
+def plan_of(
+    study: Study,
+    folder: Path,
+    retry: Collection[Status] = (),
+    only: str | Collection[str] = (),
+    skip: str | Collection[str] = (),
+    failed: bool = False,
+    shard: str | None = None,
+    jobs: int | None = None,
+) -> Plan:
+    """What `run` would do with the same arguments. The folder need not exist, and is not written.
+
+    Raises StudyError as `run` does.
+    """
+    portion = portion_of(study, only, skip, failed, shard)
+    standings = Standings(Parts(folder), study.timing, {*retry, *portion.retry})
+
+    def ending(case: Case) -> str:
+        entry = standings.last(case)
+        return LEFT if entry is None else status_of(entry.measured).word
+
+    chosen = study.cases if portion.is_whole else portion.cases(study, ending)
+    words = {case.id: standings.of(case).word for case in chosen}
+    last = {case.id: entry for case in study.cases if (entry := standings.last(case)) is not None}
+    known = {case: entry.elapsed for case, entry in last.items() if entry.elapsed == entry.elapsed}
+    frame = forecast(study)
+    expected = seconds_expected(study.cases, dict(zip(frame["case"], frame["seconds_all"], strict=True)), known)
+    frame["seconds_expected"] = frame["case"].map(expected) * study.timing.rounds
+    frame.insert(1, "plan", frame["case"].map(words))
+    frame = frame[frame["case"].isin(words)].reset_index(drop=True)
+    left = frame[frame["plan"] != KEPT]
+    at_a_time = min(jobs_here(study.timing, jobs), max(1, len(left)))
+    cases = f"{len(known)} case{'' if len(known) == 1 else 's'}"
+    basis = (
+        f"forecast: from the seconds of {cases} of this study in the folder, by what is swept" if known else ASSUMPTION
+    )
+    return Plan(frame, float(left["seconds_expected"].sum()) / at_a_time, at_a_time, basis)
