@@ -19,8 +19,14 @@ from nlsolve.study.case import Case
 OVERHEAD = 0.05
 """Seconds of a case beside its work, where none has been run yet: it is sent to a worker process and written [s]."""
 
-PENALTY = 0.05
-"""λ: a value that one known case has is taken for telling by all but this part."""
+PENALTY = 0.3
+"""λ: of the effect of a value that one known case has, 1/(1 + λ) is believed."""
+
+SHORTEST = 1e-3
+"""Seconds that a case takes at least in the fit [s]."""
+
+FEWEST_LEFT_OUT, MOST_LEVERAGE = 3, 0.9
+"""Number of known cases from which on each is told from the others; and how far a case may decide on itself."""
 
 MOST_VALUES = 40
 """Number of values of a parameter up to which each has an effect of its own."""
@@ -46,20 +52,29 @@ def seconds_expected(
     chosen = [case for case in cases if case.id in known]
     chosen = chosen[:: -(-len(chosen) // MOST_KNOWN)]
     features = _Features(chosen)
-    ratios = np.log([max(known[case.id], 1e-3) / prior[case.id] for case in chosen])
-    mean = float(np.median(ratios))
-    x = features.of(chosen)
-    effects = np.linalg.solve(x.T @ x + PENALTY * np.eye(x.shape[1]), x.T @ (ratios - mean))
-    fitted = np.exp(mean + features.of(cases) @ effects)
-    expected = {case.id: prior[case.id] * float(ratio) for case, ratio in zip(cases, fitted, strict=True)}
-    return expected | {case.id: known[case.id] for case in cases if case.id in known}
+    x, scale = features.of(chosen), np.array([prior[case.id] for case in chosen])
+    taken = np.array([max(known[case.id], SHORTEST) for case in chosen])
+    penalties = PENALTY * np.eye(x.shape[1])
+    penalties[0, 0] = 0.0
+    inverse = np.linalg.inv(x.T @ x + penalties)
+    effects = inverse @ x.T @ np.log(taken / scale)
+    fitted = {
+        case.id: prior[case.id] * math.exp(value)
+        for case, value in zip(cases, features.of(cases) @ effects, strict=True)
+    }
+    level = 1.0
+    if len(chosen) >= FEWEST_LEFT_OUT:
+        leverage = np.minimum(np.einsum("ij,jk,ik->i", x, inverse, x), MOST_LEVERAGE)
+        without = np.log(taken / scale) - (np.log(taken / scale) - x @ effects) / (1.0 - leverage)
+        level = float(taken.sum() / (scale * np.exp(without)).sum())
+    return {case: known.get(case, level * seconds) for case, seconds in fitted.items()}
 
 
 class _Features:
-    """The columns of the least squares: 1 where a case has a value, and centred logarithms of numbers."""
+    """The columns of the least squares: 1, then 1 where a case has a value, and centred logarithms of numbers."""
 
     def __init__(self, cases: Sequence[Case]) -> None:
-        names = dict.fromkeys(name for case in cases for name in case.swept)
+        names = dict.fromkeys(name for case in cases for name in case.parameters)
         held = {name: list(dict.fromkeys(str(case.parameters.get(name)) for case in cases)) for name in names}
         self._values = {name: values for name, values in held.items() if 1 < len(values) <= MOST_VALUES}
         self._centres = {
@@ -73,7 +88,7 @@ class _Features:
         return np.array([self._row(case.parameters) for case in cases]).reshape(len(cases), -1)
 
     def _row(self, parameters: Mapping[str, Any]) -> list[float]:
-        row = []
+        row = [1.0]
         for name, values in self._values.items():
             value = str(parameters.get(name))
             row += [float(value == known) for known in values]
