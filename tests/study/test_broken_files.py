@@ -308,6 +308,16 @@ KEPT = {
     "lines that end as on old Macs": BASE.replace("\n", "\r").encode(),
     "tabs": BASE.replace(" = ", "\t=\t").encode(),
     "other alphabets": BASE.replace("Does it run?", "Läuft es? λ/μ → ∞, 中文, 🙂").encode(),
+    "comments": BASE.replace('"newton"', '"newton" # μ, "quoted", [x]').encode(),
+    "dotted keys": b'question = "q"\nscene.kind = "published"\nscene.problem = "boggs"\nsolver.kind = "newton"\n',
+    "lists over several lines": f'{BASE}{GRID}{{ "scene.problem" = [\n "boggs", # one\n "scalar",\n] }}\n'.encode(),
+    "a value that is swept twice": f'{BASE}{GRID}{{ "stop.tolerance" = [1e-8, 1e-8, 1.0e-8] }}\n'.encode(),
+    "whole numbers and fractions": f'{BASE}{GRID}{{ "scene.factor" = [1, 1.0, 2] }}\n'.encode(),
+    "a fraction that is whole": BASE.replace('"newton"', '"anm"\norder = 20.0').encode(),
+    "a setting with a long name of two lines": (
+        f'{BASE}[[sweep]]\neach = [{{ name = """two\n{"x" * 5000}""" }}, {{ name = "y", "stop.tolerance" = 1e-6 }}]\n'
+    ).encode(),
+    "a quick form alone": f'{BASE}[quick]\n"stop.tolerance" = 1e-3\n'.encode(),
     "a question of several lines": BASE.replace('"Does it run?"', '"""\nDoes it\nrun? \\"yes\\" """').encode(),
 }
 
