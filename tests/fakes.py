@@ -88,6 +88,8 @@ class Honey(ConstitutiveLaw):
 class Grid(Discretizer):
     """Operators of the identity."""
 
+    default_error_estimator: ClassVar[None] = None
+
     kind: Literal["grid"] = "grid"
     width: float | Literal["auto"] = "auto"
 

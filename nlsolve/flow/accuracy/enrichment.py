@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial import Delaunay
+import scipy
 
 from nlsolve.contracts.continuum.cloud import Cloud, Indices
 from nlsolve.series import Array
@@ -28,7 +28,7 @@ class Enriched:
 
 def inner_edges(cloud: Cloud) -> Indices:
     """The edges of the Delaunay triangulation with a node inside, (E, 2). Across a hole both ends are at its wall."""
-    corners = Delaunay(cloud.nodes).simplices
+    corners = scipy.spatial.Delaunay(cloud.nodes).simplices
     sides = np.concatenate([corners[:, [0, 1]], corners[:, [1, 2]], corners[:, [2, 0]]])
     edges = np.unique(np.sort(sides, axis=1), axis=0)
     return edges[~cloud.on_boundary[edges].all(axis=1)]
