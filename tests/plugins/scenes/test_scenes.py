@@ -191,7 +191,7 @@ def test_no_exact_solution_where_there_is_none() -> None:
     assert StirringTool(motion="orbit").exact(PowerLaw(), points, 0.0) is None
     assert StirringTool().exact(Newtonian(), points, 0.0) is None
     assert Channel().exact(Newtonian(), points, 0.0) is None
-    with pytest.raises(ValueError, match="needs a power law"):
+    with pytest.raises(SolveError, match="is no power law, whose profile the channel prescribes"):
         Channel().body_force(points, Newtonian(), Physics())
 
 
