@@ -271,8 +271,11 @@ def drawn(documents: Sequence[Table], part: float, seed: int) -> list[Table]:
 
 
 def endings(documents: Sequence[Table], seconds: int = SECONDS) -> Iterator[Ending]:
-    """Run each document."""
-    return (run(document, seconds) for document in documents)
+    """Run each document; every hundredth is told on standard error."""
+    for number, document in enumerate(documents):
+        if number and number % 100 == 0:
+            print(f"{number} of {len(documents)}", file=sys.stderr, flush=True)
+        yield run(document, seconds)
 
 
 def crashes(found: Sequence[Ending]) -> dict[str, list[Ending]]:

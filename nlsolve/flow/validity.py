@@ -63,11 +63,13 @@ class Limit:
     largest : the largest value that passes.
     sentence : what a larger value means, and the way out.
     doubt : whether a larger value puts the result in doubt.
+    always : whether the command line prints values that pass, too.
     """
 
     largest: float
     sentence: str
     doubt: bool = True
+    always: bool = True
 
 
 LIMITS: dict[str, Limit] = {

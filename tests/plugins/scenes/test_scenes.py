@@ -195,6 +195,12 @@ def test_no_exact_solution_where_there_is_none() -> None:
         Channel().body_force(points, Newtonian(), Physics())
 
 
+def test_a_channel_refuses_a_law_that_is_no_power_law() -> None:
+    with pytest.raises(Misfit, match=r"law\.kind: is no power law, .* or the scene couette, which takes any law"):
+        Channel().check(setup(Channel(), law=Newtonian(), start=Start(by="load", values=())))
+    Channel().check(setup(Channel()))
+
+
 @pytest.mark.parametrize("index", [1.0, 0.5, 0.3, 0.1324])
 def test_channel_profile_carries_the_mean_speed_and_balances_its_force(index: float) -> None:
     """Mean of u over the height; dτ/dy = −G with τ = S_xy, ε̇xy = u'/2."""
