@@ -147,7 +147,7 @@ def test_a_small_error_an_unknown_one_and_one_without_estimate_say_nothing() -> 
         assert np.isnan(disagreement("spin", error, estimate).value)
     found = disagreement("spin", 0.5, 0.01)
     assert found.value == pytest.approx(50.0)
-    assert "is 50 % from the exact solution of the scene 'spin', and another discretization" in found.sentence
+    assert "is 50 % from the exact solution of the scene 'spin', and its error is estimated as 1 %" in found.sentence
 
 
 # Numbers in SI units.
@@ -215,11 +215,11 @@ def test_no_shipped_scene_belies_itself(scene: FlowScene, name: str) -> None:
 
 
 def test_claims_are_audited_where_the_other_audits_cannot_be_made() -> None:
-    class Fails(LinearTriangles):
-        def operators(self, cloud: Cloud, volumetric: bool) -> Any:
+    class Fails(MovingLeastSquares):
+        def gradient(self, cloud: Cloud) -> Any:
             raise SolveError(Status.BAD_CLOUD, "inside out")
 
-    found = row(Manufactured(spacing=0.15), law=Donor(share=5.0), start=AT_ONCE, error_estimator=Fails())
+    found = row(Manufactured(spacing=0.15), law=Donor(share=5.0), start=AT_ONCE, discretizer=Fails())
     assert found["doubt"].startswith("the audits could not be made: inside out; the law 'donor' gives off power")
 
 

@@ -16,8 +16,8 @@ from odd_nodes import CSV, FIELD_DATA, ODD, annulus, vtu_with
 
 from nlsolve import SolveError, Status
 from nlsolve.plugin import Cloud, FlowScene
-from nlsolve.solving.ledger import Ledger
 from nlsolve.solving.simulate import run_case, simulation_of
+from nlsolve.solving.work.ledger import Ledger
 
 NAMES = ("tool", "plate")
 
