@@ -22,6 +22,9 @@ LONGEST_VALUE = 60
 UNFIT = (AttributeError, IndexError, TypeError, ValueError)
 """What Python and NumPy raise when a formula for arrays asks of a series what only an array has."""
 
+OVERFLOWS = (OverflowError, ZeroDivisionError)
+"""What numbers of Python raise where those of NumPy become inf or NaN."""
+
 
 class FormulaProblem(NonlinearProblem):
     """F(u) = 0; the Jacobian is coefficient 1 of the formula run on u with the seeds of a group of columns.
@@ -57,13 +60,31 @@ class FormulaProblem(NonlinearProblem):
         return self._given is None
 
     def residual(self, u: Array) -> Array:
-        """F(u), (U,). Raises InputError when it is no (U,) array of real numbers."""
-        return real(self._formula(u), u.shape, "F(u)")
+        """F(u), (U,); NaN where a number of Python overflows in F or is divided by zero. Raises InputError when F(u) is
+        no (U,) array of real numbers.
+        """
+        try:
+            return real(self._formula(u), u.shape, "F(u)")
+        except OVERFLOWS:
+            return np.full(u.shape, np.nan)
+
+    def undefined(self, u: Array) -> str:
+        """What a number of Python raises in F at u."""
+        try:
+            self._formula(u)
+        except OVERFLOWS as error:
+            return f"F has no value here: {_said(error)}; choose a start or a method that keeps away from there"
+        return ""
 
     def jacobian(self, u: Array) -> Any:
-        """J(u), sparse (U, U). Raises SolveError (not applicable) when there is none, InputError for a wrong one."""
+        """J(u), sparse (U, U). Raises SolveError (not applicable) when there is none, and (non-finite) where a number
+        of Python overflows in it; InputError for a wrong one.
+        """
         if self._given is not None:
-            return _matrix(self._given(u), len(u))
+            try:
+                return _matrix(self._given(u), len(u))
+            except OVERFLOWS as error:
+                raise SolveError(Status.NON_FINITE, f"jacobian(u) has no value here: {_said(error)}") from error
         return self._colouring.unpack(self.derivative(u, self._colouring.seeds))
 
     def expand(self, u: Array) -> Expansion:
@@ -73,6 +94,8 @@ class FormulaProblem(NonlinearProblem):
         path = Series(u)
         try:
             return Expansion(path, self._along(path))
+        except OVERFLOWS as error:
+            raise SolveError(Status.NON_FINITE, f"F has no series here: {_said(error)}") from error
         except UNFIT as error:
             raise SolveError(
                 Status.NOT_APPLICABLE,
@@ -92,6 +115,8 @@ class FormulaProblem(NonlinearProblem):
             return np.stack(products, axis=1) if products else directions
         except NoSeriesHere as error:
             raise SolveError(Status.NON_FINITE, f"F has no derivative here: {error}") from error
+        except OVERFLOWS as error:
+            raise SolveError(Status.NON_FINITE, f"F has no derivative here: {_said(error)}") from error
         except UNFIT as error:
             raise SolveError(
                 Status.NOT_APPLICABLE,

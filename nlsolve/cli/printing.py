@@ -140,13 +140,15 @@ def _printed(results: Results, run: Mapping[str, Any]) -> str:
 
 
 def left_out(runs: pd.DataFrame) -> list[str]:
-    """Lines with the worst value of each audit over the cases and what to do about it; none when no audit was made."""
+    """Lines with the worst value of each audit over the cases and what to do about it; none when no audit was made.
+    What law, scene and numbers claim is told only where it does not hold.
+    """
     lines = []
     for name, limit in LIMITS.items():
         values = pd.to_numeric(runs[name]).dropna()
         over = int((values > limit.largest).sum())
         advice = f"  in {count(over)}: {limit.sentence}" if over else ""
-        if len(values):
+        if over or (limit.always and len(values)):
             lines.append(f"  {name.removeprefix('audit.').replace('_', ' '):<23} {values.max():<8.2g}{advice}".rstrip())
     return ["What the scenes left out, at its largest:", *lines] if lines else []
 

@@ -49,3 +49,9 @@ class Component(BaseModel):
         if field is None or not isinstance(field.default, str):
             raise TypeError(f'{cls.__name__} must declare its name: kind: Literal["name"] = "name"')
         return field.default
+
+    @classmethod
+    def called(cls) -> str:
+        """The kind, or the name of a class that declares none, for sentences."""
+        field = cls.model_fields.get("kind")
+        return field.default if field is not None and isinstance(field.default, str) else cls.__name__

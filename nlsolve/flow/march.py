@@ -9,11 +9,13 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from nlsolve.contracts.continuum.cloud import Cloud
 from nlsolve.contracts.outcome import Outcome
 from nlsolve.contracts.problem import NonlinearProblem
 from nlsolve.contracts.scene import Entry, Simulation, Solve, Workload
 from nlsolve.contracts.status import SolveError, Status
 from nlsolve.flow.accuracy.estimate import error_estimate
+from nlsolve.flow.claims.units import SMALL, WAY_OUT
 from nlsolve.flow.continuation import REST, Solves, Stage, walk
 from nlsolve.flow.incompressibility import iterate_pressure
 from nlsolve.flow.momentum import Flow
@@ -77,7 +79,7 @@ class FlowSimulation(Simulation):
 
     def begin(self) -> None:
         """Build the cloud at t = 0 and its operators, and find the node of the probe. May raise SolveError."""
-        self.initial = cloud = self.parts.scene.cloud(self.parts.law)
+        self.initial = cloud = self.cloud()
         self.sizes = {
             "nodes": len(cloud.nodes),
             "unknowns": 2 * len(cloud.interior),
@@ -87,6 +89,19 @@ class FlowSimulation(Simulation):
         probe, inside = self.parts.record.probe, cloud.interior
         if probe is not None:
             self.probe = int(inside[np.linalg.norm(cloud.nodes[inside] - probe, axis=1).argmin()])
+
+    def cloud(self) -> Cloud:
+        """The nodes at t = 0. Raises SolveError (bad cloud) when none of them is inside."""
+        cloud = self.parts.scene.cloud(self.parts.law)
+        if not len(cloud.interior):
+            extent = float(np.ptp(cloud.nodes, axis=0).max())
+            raise SolveError(
+                Status.BAD_CLOUD,
+                f"all {len(cloud.nodes)} nodes lie on the boundary and none inside, so that nothing is left to solve "
+                "for: choose a finer spacing, or a file with inner nodes"
+                + (f"; the scene is {extent:.3g} mm wide: are its lengths in m? {WAY_OUT}" if extent < SMALL else ""),
+            )
+        return cloud
 
     def first_state(self) -> Solves:
         """Solve the quasi-static problem at t = 0 by continuation; the method of the case solves a steady target."""
@@ -200,7 +215,8 @@ class FlowSimulation(Simulation):
             solved = outcome.status is Status.CONVERGED
             return error_estimate(state, velocity, self.before) if solved else float("nan")
 
-        return found | audit(parts, flow, velocity, change, time, estimate)
+        error = found.get("velocity_error_inside", float("nan"))
+        return found | audit(parts, flow, velocity, change, time, estimate, error)
 
     def place(self, blame: Mapping[str, float]) -> str:
         """The place of the largest residual and the strain rate there, in words."""
@@ -236,7 +252,7 @@ class FlowSimulation(Simulation):
 
     def diagnostics(self) -> list[dict[str, Any]]:
         """One row for each operator of the cloud at t = 0 on its quality, or one with the reason why there is none."""
-        cloud = self.parts.scene.cloud(self.parts.law)
+        cloud = self.cloud()
         try:
             found = self.parts.discretizer.diagnostics(cloud) or [{"operator": "this discretizer gives no diagnostics"}]
         except SolveError as refusal:

@@ -213,7 +213,7 @@ class Flow(NonlinearProblem):
         where = ~np.isfinite(self.law.viscosity(squared))
         if not (where & np.isfinite(squared)).any():
             return ""
-        return f"the law {self.law.kind_name()!r} has no finite viscosity at {self._spot(u, where)}; {WAY_OUT}"
+        return f"the law {self.law.called()!r} has no finite viscosity at {self._spot(u, where)}; {WAY_OUT}"
 
     def without_series(self, u: Array, refusal: NoSeriesHere) -> SolveError:
         """The error of a law whose formula has refused to give the series, with a strain point where it does not."""
@@ -224,7 +224,7 @@ class Flow(NonlinearProblem):
         spot = f" at {self._spot(u, where)}" if where.any() else ""
         return SolveError(
             Status.NON_FINITE,
-            f"the law {self.law.kind_name()!r} has no series{spot}: {refusal}; {WAY_OUT}, or choose a method that "
+            f"the law {self.law.called()!r} has no series{spot}: {refusal}; {WAY_OUT}, or choose a method that "
             "needs no series, such as newton",
         )
 

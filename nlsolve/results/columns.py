@@ -207,6 +207,24 @@ RUNS = _by_name(
         "audit.heating", "largest adiabatic heating S:ε̇/(ρ c_p) over the time reached, or a time 2π/reference rate", "K"
     ),
     Column(
+        "audit.gained_power",
+        "largest −S:ε̇ over the largest |S:ε̇| at the strain points; 0 for a viscosity that is positive",
+    ),
+    Column(
+        "audit.falling_stress",
+        "part by which 2 μ ε̄ falls below its largest value at a smaller rate, over the range of rates of the state",
+    ),
+    Column(
+        "audit.exact",
+        "velocity_error_inside over velocity_error_estimate, where the error is above 5 % and nothing else in doubt: "
+        "large where the exact solution does not solve the scene",
+    ),
+    Column(
+        "audit.units",
+        "2 μ ε̄ at the reference rate, and in a scene below 0.1 mm the density, over the largest of any material in MPa "
+        "and t/mm³: above 1 the numbers look like SI units",
+    ),
+    Column(
         "doubt",
         "what the audits, a system's roots, or work in other processes put in doubt, and the way out; empty when "
         "nothing",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cache
 from typing import Any
@@ -10,7 +11,7 @@ from typing import Any
 import numpy as np
 from pydantic import BaseModel, ConfigDict, ValidationError, create_model
 
-from nlsolve.algebra.formula import NUMBERS, FormulaProblem, real
+from nlsolve.algebra.formula import NUMBERS, OVERFLOWS, FormulaProblem, real
 from nlsolve.algebra.system import System
 from nlsolve.contracts.component import Component
 from nlsolve.contracts.linear_solver import LinearSolver
@@ -103,9 +104,11 @@ def _start(caller: str, start: Any) -> Array:
 
 
 def _check_residual(caller: str, residual: Formula, start: Array) -> None:
-    """Raises InputError unless F(start) is a (U,) array of numbers. The driver tells whether they are finite."""
+    """Raises InputError unless F(start) is a (U,) array of numbers. The driver tells whether they are finite, and
+    whether a number of Python overflows in F.
+    """
     try:
-        with np.errstate(all="ignore"):
+        with suppress(*OVERFLOWS), np.errstate(all="ignore"):
             real(residual(start.copy()), start.shape, "F(start)")
     except InputError as error:
         raise InputError(f"{caller}: problem: {error}") from error

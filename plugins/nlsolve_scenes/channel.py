@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
-from typing import ClassVar, Literal
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 from pydantic import Field
 
-from nlsolve.plugin import Cloud, ConstitutiveLaw, Exact, FlowScene, Physics
+from nlsolve.plugin import Cloud, ConstitutiveLaw, Exact, FlowScene, Misfit, Physics, SolveError, Status
 from nlsolve_scenes.nodes.files import NodeFile
 from nlsolve_scenes.nodes.scatter import jittered, scatter
+
+NO_POWER_LAW = (
+    "is no power law, whose profile the channel prescribes at its ends: choose the law power-law or norton-hoff, or "
+    "the scene couette, which takes any law"
+)
 
 
 class Channel(FlowScene):
@@ -32,6 +37,12 @@ class Channel(FlowScene):
     seed: int = Field(0, ge=0, description="seed of scattered nodes and of the random shifts")
 
     keeps_nodes: ClassVar[str | None] = "material leaves the channel"
+
+    def check(self, parts: Any) -> None:
+        """Raises Misfit for a law that is no power law."""
+        super().check(parts)
+        if parts.law.power_form() is None:
+            raise Misfit("law", "kind", NO_POWER_LAW)
 
     @property
     def reference_rate(self) -> float:
@@ -89,10 +100,10 @@ class Channel(FlowScene):
         )
 
     def _profile(self, law: ConstitutiveLaw, points: np.ndarray) -> tuple[np.ndarray, float]:
-        """Exact velocity (N, 2) and G. Raises ValueError for a law that is no power law."""
+        """Exact velocity (N, 2) and G. Raises SolveError (not applicable) for a law that is no power law."""
         form = law.power_form()
         if form is None:
-            raise ValueError(f'scene.kind = "channel" needs a power law for its ends, and {law.kind_name()!r} is none')
+            raise SolveError(Status.NOT_APPLICABLE, f"{law.called()!r} {NO_POWER_LAW}")
         n, height = form.index, self.half_height
         # u_max = (2n + 1)/(n + 1) · mean speed, and γ̇ at the wall = (2n + 1)/n · mean speed/H.
         wall_rate = (2.0 * n + 1.0) / n * self.mean_speed / height

@@ -220,6 +220,13 @@ def test_the_command_line_tells_the_worst_values_and_what_to_do() -> None:
     assert left_out(runs.assign(**{name: np.nan for name in LIMITS})) == []
 
 
+def test_the_command_line_tells_of_claims_only_where_they_do_not_hold() -> None:
+    nothing = pd.DataFrame({name: [np.nan, np.nan] for name in LIMITS})
+    assert left_out(nothing.assign(**{"audit.gained_power": 0.0, "audit.units": 0.5})) == []
+    _, line = left_out(nothing.assign(**{"audit.gained_power": [0.0, 0.1]}))
+    assert line.split("  in 1 case: ") == ["  gained power            0.1     ", LIMITS["audit.gained_power"].sentence]
+
+
 def test_a_residual_small_only_beside_a_huge_penalty_is_in_doubt() -> None:
     """λ/μ = 1e8 makes 1e-8 of all forces 1e-3 of the stresses: the test is met before these are in balance."""
     graded = GradedRings(first=0.08, growth=0.15, spacing=0.4)

@@ -20,13 +20,15 @@ Indices = NDArray[np.intp]
 class Cloud:
     """Nodes (N, 2) [mm] and the named groups of boundary nodes among them.
 
-    Raises SolveError (bad cloud) when a coordinate is not finite or two nodes coincide.
+    Raises SolveError (bad cloud) when there is none, a coordinate is not finite, or two nodes coincide.
     """
 
     nodes: Array
     boundaries: Mapping[str, Indices]
 
     def __post_init__(self) -> None:
+        if not len(self.nodes):
+            raise SolveError(Status.BAD_CLOUD, "there are no nodes")
         if not np.isfinite(self.nodes).all():
             bad = int(np.flatnonzero(~np.isfinite(self.nodes).all(axis=1))[0])
             raise SolveError(Status.BAD_CLOUD, f"node {bad} has a coordinate that is not a finite number")

@@ -40,7 +40,7 @@ class ScipyRoot(NonlinearSolver):
 
     def steps(self, problem: NonlinearProblem, tangent: KeptTangent, start: np.ndarray) -> Iterator[Step]:
         """The start, and the ends of the runs. Raises SolveError (stagnated) if a step or pivot of SciPy vanishes, or,
-        without preconditioning, where SciPy has ended.
+        without preconditioning, where SciPy has ended; (non-finite) if a number of SciPy overflows.
         """
         state, known = start, [problem.residual(start)]
         size = float(np.linalg.norm(known[0]))
@@ -105,6 +105,9 @@ class ScipyRoot(NonlinearSolver):
             found = scipy.optimize.root(shifted, begin, jac=given, method=self.method, options=self._options(goal))
         except ValueError as error:  # how SciPy's Jacobians say that a step or a pivot vanished
             raise SolveError(Status.STAGNATED, f"scipy.optimize.root, {self.method}: {error}") from error
+        except (OverflowError, ZeroDivisionError) as error:  # its line searches work with numbers of Python
+            said = f"a number overflows or is divided by zero in its line search ({error}); choose another method"
+            raise SolveError(Status.NON_FINITE, f"scipy.optimize.root, {self.method}: {said}") from error
         return found, values
 
     def _options(self, goal: float) -> dict[str, Any]:

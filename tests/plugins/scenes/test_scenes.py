@@ -191,8 +191,14 @@ def test_no_exact_solution_where_there_is_none() -> None:
     assert StirringTool(motion="orbit").exact(PowerLaw(), points, 0.0) is None
     assert StirringTool().exact(Newtonian(), points, 0.0) is None
     assert Channel().exact(Newtonian(), points, 0.0) is None
-    with pytest.raises(ValueError, match="needs a power law"):
+    with pytest.raises(SolveError, match="is no power law, whose profile the channel prescribes"):
         Channel().body_force(points, Newtonian(), Physics())
+
+
+def test_a_channel_refuses_a_law_that_is_no_power_law() -> None:
+    with pytest.raises(Misfit, match=r"law\.kind: is no power law, .* or the scene couette, which takes any law"):
+        Channel().check(setup(Channel(), law=Newtonian(), start=Start(by="load", values=())))
+    Channel().check(setup(Channel()))
 
 
 @pytest.mark.parametrize("index", [1.0, 0.5, 0.3, 0.1324])
