@@ -189,8 +189,12 @@ def plan(
     print_frame(count(len(frame)), frame[["case", "plan", *swept, *sizes]])
     words = ", ".join(f"{number} {word}" for word, number in frame["plan"].value_counts().items()) or "none chosen"
     typer.echo(f"{words} (results in {folder})")
-    side_by_side = f", {planned.jobs} at a time" if planned.jobs > 1 else ""
-    typer.echo(f"{planned.seconds:.3g} s to run {count(len(planned.left))}{side_by_side} ({planned.basis})")
+    if checked.timing.is_exclusive:
+        how_long = f"{planned.seconds:.3g} to {planned.seconds_most:.3g} s to time {count(len(planned.left))} in rounds"
+    else:
+        side_by_side = f", {planned.jobs} at a time" if planned.jobs > 1 else ""
+        how_long = f"{planned.seconds:.3g} s to run {count(len(planned.left))}{side_by_side}"
+    typer.echo(f"{how_long} ({planned.basis})")
 
 
 @app.command()

@@ -25,7 +25,7 @@ from nlsolve.registry.problems import StudyError, did_you_mean
 from nlsolve.running.packing.pack import export as packed
 from nlsolve.running.store.reading import FolderStatus, read_tables, status_of_folder
 from nlsolve.running.store.upkeep import merge_folders, remove, superfluous
-from nlsolve.show.tables import build
+from nlsolve.show.tables import built
 
 folders = typer.Typer()
 
@@ -44,9 +44,13 @@ def table(
         names = [spec.name for spec in described.tables]
         if name is not None and name not in names:
             raise StudyError(f"{folder}: there is no table {name!r}; {did_you_mean(name, names)}")
-        tables = [build(spec, runs) for spec in described.tables if name in (None, spec.name)]
+        tables, refused = built([spec for spec in described.tables if name in (None, spec.name)], runs)
+        if name is not None and refused:
+            raise StudyError(*refused)
     if len(runs) < len(described.cases):
         say(f"{folder}: {len(runs)} of {count(len(described.cases))} are finished")
+    for sentence in refused:
+        say(sentence)
     if as_json:
         typer.echo(json.dumps({table.spec.name: table.long() for table in tables}))
         return

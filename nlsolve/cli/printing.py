@@ -80,6 +80,8 @@ def print_table(table: Table) -> None:
     if _is_large(table.cells):
         for title, frame in table.flat().items():
             print_frame(title, frame)
+        for note in table.notes:
+            typer.echo(note)
         return
     for printed in table.rich():
         stdout().print(printed)

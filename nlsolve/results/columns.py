@@ -17,6 +17,7 @@ class Column:
     unit : such as "mm/s"; empty for words, counts and ratios.
     symbol : what an axis calls the column, in TeX mathematics or in words; empty: its name with spaces.
     relative_error : whether it is a relative error, which people read in percent.
+    timed : whether it was read from a clock while the case ran.
     """
 
     name: str
@@ -24,6 +25,7 @@ class Column:
     unit: str = ""
     symbol: str = ""
     relative_error: bool = False
+    timed: bool = False
 
 
 def _by_name(*columns: Column) -> Mapping[str, Column]:
@@ -90,43 +92,71 @@ RUNS = _by_name(
     Column(
         "start_way", "name of the way to the first state; the rows that share one were served by one solution of it"
     ),
-    Column("seconds", "time inside the method: its own work and all it asked for", "s", "time inside the method"),
-    Column("seconds_factorization", "the part of `seconds` spent on factorising", "s"),
-    Column("seconds_triangular_solve", "the part of `seconds` spent on triangular solves", "s"),
-    Column("seconds_jacobian", "the part of `seconds` spent on assembling Jacobians", "s"),
-    Column("seconds_residual", "the part of `seconds` spent on residuals", "s"),
-    Column("seconds_series", "the part of `seconds` spent on series coefficients", "s"),
-    Column("seconds_own", "the part of `seconds` spent by the method itself: norms, mixing, extrapolation", "s"),
-    Column("seconds_most", "`seconds` of the slowest of several rounds", "s"),
+    Column(
+        "seconds",
+        "time inside the method: its own work and all it asked for",
+        "s",
+        "time inside the method",
+        timed=True,
+    ),
+    Column("seconds_factorization", "the part of `seconds` spent on factorising", "s", timed=True),
+    Column("seconds_triangular_solve", "the part of `seconds` spent on triangular solves", "s", timed=True),
+    Column("seconds_jacobian", "the part of `seconds` spent on assembling Jacobians", "s", timed=True),
+    Column("seconds_residual", "the part of `seconds` spent on residuals", "s", timed=True),
+    Column("seconds_series", "the part of `seconds` spent on series coefficients", "s", timed=True),
+    Column(
+        "seconds_own", "the part of `seconds` spent by the method itself: norms, mixing, extrapolation", "s", timed=True
+    ),
+    Column("seconds_most", "`seconds` of the slowest of several rounds", "s", timed=True),
     Column(
         "seconds_predicted",
         "`seconds` by the cost model: counts times unit costs, and own work as with other linear solvers",
         "s",
     ),
-    Column("rounds", "how often the case was timed; the seconds are those of its fastest round"),
+    Column("seconds_low", "exclusive lane: lower end of the 95 % interval of the median `seconds`", "s", timed=True),
+    Column("seconds_high", "exclusive lane: upper end of the 95 % interval of the median `seconds`", "s", timed=True),
+    Column(
+        "rounds",
+        "how often the case was timed; all seconds are those of its fastest round, in the exclusive lane of the round "
+        "whose `seconds` are the median",
+    ),
+    Column(
+        "lane",
+        "where the seconds come from: exclusive (one case at a time, warm, pinned to a core, in rounds), alone (one "
+        "case at a time) or shared (several at a time, or on a cluster)",
+    ),
+    Column("core", "exclusive lane: number of the core that the case was pinned to"),
+    Column("load", "exclusive lane: share of the time for which others kept the case from its core, median of rounds"),
     Column("clock", "clock of the seconds: wall, or processor, which does not count the time given to other programs"),
     Column("environment", "where the case was computed: a name in the folder `environments` and in the report"),
-    Column("unit.residual", "measured on the last problem of the case: seconds of one residual", "s"),
-    Column("unit.expansion", "as unit.residual: beginning a series", "s"),
-    Column("unit.jacobian", "as unit.residual: one Jacobian", "s"),
-    Column("unit.matrix_product", "as unit.residual: one product with a Jacobian", "s"),
-    Column("unit.factorization", "as unit.residual: one factorisation, its ordering known", "s"),
-    Column("unit.triangular_solve", "as unit.residual: one pair of triangular solves", "s"),
+    Column("unit.residual", "measured on the last problem of the case: seconds of one residual", "s", timed=True),
+    Column("unit.expansion", "as unit.residual: beginning a series", "s", timed=True),
+    Column("unit.jacobian", "as unit.residual: one Jacobian", "s", timed=True),
+    Column("unit.matrix_product", "as unit.residual: one product with a Jacobian", "s", timed=True),
+    Column("unit.factorization", "as unit.residual: one factorisation, its ordering known", "s", timed=True),
+    Column("unit.triangular_solve", "as unit.residual: one pair of triangular solves", "s", timed=True),
     Column(
-        "unit.series_order", "as unit.residual: c_order of a Taylor coefficient j, which costs c_order + j c_term", "s"
+        "unit.series_order",
+        "as unit.residual: c_order of a Taylor coefficient j, which costs c_order + j c_term",
+        "s",
+        timed=True,
     ),
     Column(
-        "unit.series_term", "as unit.residual: c_term of a Taylor coefficient j, which costs c_order + j c_term", "s"
+        "unit.series_term",
+        "as unit.residual: c_term of a Taylor coefficient j, which costs c_order + j c_term",
+        "s",
+        timed=True,
     ),
-    Column("seconds_operators", "building operators, the same for every method and not in `seconds`", "s"),
-    Column("seconds_start", "reaching the first state", "s"),
-    Column("seconds_all", "operators, first state and march: what the result costs in all", "s"),
+    Column("seconds_operators", "building operators, the same for every method and not in `seconds`", "s", timed=True),
+    Column("seconds_start", "reaching the first state", "s", timed=True),
+    Column("seconds_all", "operators, first state and march: what the result costs in all", "s", timed=True),
     Column("ordering", "column ordering the linear solver used"),
     Column("fill", "entries stored in the last factors", symbol="entries of the factors"),
     Column(
         "factor_solve_ratio",
         "measured time of one factorisation over one pair of triangular solves",
         symbol="factorisation / triangular solve",
+        timed=True,
     ),
     Column("condition", "estimate of ‖K*‖₁ ‖K*⁻¹‖₁ for the last tangent, where the linear solver can tell"),
     Column(
@@ -293,7 +323,13 @@ STEPS = _by_name(
         "anm: per order; petsc-snes, kinsol: per solve with K*; scipy-root: per value of R)",
     ),
     *REPORTED.values(),
-    Column("seconds", "time inside the method so far in the march", "s", "time inside the method"),
+    Column(
+        "seconds",
+        "time inside the method so far in the march; in the exclusive lane of the last round",
+        "s",
+        "time inside the method",
+        timed=True,
+    ),
     Column("rate_drift", "accumulated strain rates, on accepted steps: ‖ε̇ − B v‖/‖ε̇‖"),
     Column("probe_x", "x of the probe node, on accepted steps", "mm", "$x$"),
     Column("probe_y", "y of the probe node, on accepted steps", "mm", "$y$"),
@@ -311,6 +347,11 @@ NOTE, MEASURED = "note.", "measured."
 def step_columns(notes: Mapping[str, Any]) -> dict[str, Any]:
     """What a method notes of a step, by columns of `steps`: those described there, or "note.<name>"."""
     return {name if name in STEPS else f"{NOTE}{name}": value for name, value in notes.items()}
+
+
+def is_timed(column: str) -> bool:
+    """Whether a column of `runs` was read from a clock."""
+    return column in RUNS and RUNS[column].timed
 
 
 def is_measured(column: str) -> bool:

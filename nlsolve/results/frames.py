@@ -29,6 +29,7 @@ class Part:
 
     environment : what it was computed with, such as versions and processor; its row has the digest of it.
     output : what the case has printed, cut in the middle where it is long; empty where nobody has listened.
+    rounds : of a case in the exclusive lane, what each round has measured: columns of `runs`.
     """
 
     run: Row
@@ -36,6 +37,7 @@ class Part:
     fields: pd.DataFrame
     environment: Mapping[str, str] = field(default_factory=dict)
     output: str = ""
+    rounds: tuple[Row, ...] = ()
 
 
 def steps_frame(rows: Sequence[Mapping[str, Any]]) -> pd.DataFrame:

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from typing import Any
 
 import pandas as pd
 
-from nlsolve.contracts.component import Component
-from nlsolve.registry.component_tables import class_name
-from nlsolve.running.timing import calibrate
+from nlsolve.running.timing.calibration import calibrate
+from nlsolve.running.timing.rounds import comparisons, span_of
 from nlsolve.solving.simulate import simulation_of
 from nlsolve.solving.work.ledger import Ledger
 from nlsolve.study.study import Study
@@ -40,19 +40,15 @@ SAMPLE = [
 ]
 """Columns that `costs_of` gives: sizes of a case and seconds [s] of its work."""
 
-METHOD = ("solver", "refresh", "operator", "predictor", "stop", "budget", "record", "limits")
-"""Sections that do not change what a unit of work costs."""
-
 
 def forecast(study: Study) -> pd.DataFrame:
     """One row for each case: its swept parameters, its size, and its seconds [s] under the `ASSUMPTION`."""
     measured: dict[str, dict[str, Any]] = {}
     rows = []
     for case in study.cases:
-        key = "".join(_identity(part) for name, part in case.parts if name not in METHOD)
-        if key not in measured:
-            measured[key] = costs_of(case.parts)
-        costs, work = measured[key], simulation_of(case.parts, Ledger().entry).workload()
+        if case.problem not in measured:
+            measured[case.problem] = costs_of(case.parts)
+        costs, work = measured[case.problem], simulation_of(case.parts, Ledger().entry).workload()
         seconds = {
             "seconds_start": STAGE * work.stages * costs["seconds_iteration"],
             "seconds": work.increments * costs["seconds_increment"],
@@ -63,8 +59,11 @@ def forecast(study: Study) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
-def _identity(part: Component | None) -> str:
-    return "" if part is None else class_name(type(part)) + part.model_dump_json()
+def span_in_lane(study: Study, seconds: Mapping[str, float]) -> tuple[float, float]:
+    """How long the exclusive lane takes, at least and at most [s]. seconds : of one run of each case that is left."""
+    rounds = [sum(seconds.get(case.id, 0.0) for case in members) for members in comparisons(study.cases)]
+    spans = [span_of(one_round, study.timing) for one_round in rounds if one_round]
+    return sum(least for least, _ in spans), sum(most for _, most in spans)
 
 
 def costs_of(parts: Any) -> dict[str, Any]:

@@ -21,11 +21,12 @@ from nlsolve.running.portions.portion import FAILED, portion_of
 from nlsolve.running.store.parts import Parts, StoreError, merge
 from nlsolve.running.store.reading import completed, description_of, environments_of, finished, of_one_source
 from nlsolve.running.store.store import Store
+from nlsolve.running.timing.exclusive import ExclusiveTurns
 from nlsolve.running.turns import Turns
 from nlsolve.show.expectations import Finding, judged
 from nlsolve.show.figures import FigureError, draw, save
 from nlsolve.show.report import write_report
-from nlsolve.show.tables import Table, build
+from nlsolve.show.tables import Table, build, built
 from nlsolve.study.study import Study
 
 SECONDS_BETWEEN_FRAMES = 10.0
@@ -63,7 +64,7 @@ class Results:
 
     def tables(self) -> list[Table]:
         """The declared tables that these runs can fill; the others are in `notes`."""
-        return _tables(self.study, self.runs)[0]
+        return built(self.study.tables, self.runs)[0]
 
     def table(self, name: str) -> pd.DataFrame:
         """The cells of a declared table. Raises StudyError if no table has this name or these runs cannot fill it."""
@@ -125,7 +126,7 @@ def run(
         for number, (case, row) in enumerate(zip(study.cases, rows_of(frames.runs), strict=True), 1):
             tell(Event(case, number, len(study.cases), run=row, resumed=True))
         return Results(study, frames.runs, frames.steps, frames.fields, store.folder, notes)
-    turns = Turns(study, store, chosen)
+    turns = (ExclusiveTurns if study.timing.is_exclusive else Turns)(study, store, chosen)
     written = time.monotonic()
     try:
         with closing(chosen_engine.parts(turns.each(tell), study.timing, tell)) as ended:
@@ -194,33 +195,30 @@ def _unfinished(finished: int, planned: int, judges: bool = False) -> tuple[str,
     return (f"{finished} of {planned} cases are finished{later}",) if finished < planned else ()
 
 
-def _tables(study: Study, runs: pd.DataFrame) -> tuple[list[Table], list[str]]:
-    tables, notes = [], []
-    for spec in study.tables:
-        try:
-            tables.append(build(spec, runs))
-        except StudyError as error:
-            notes.append(str(error))
-    return tables, notes
-
-
 def _show(store: Store, study: Study, frames: Frames) -> tuple[str, ...]:
     """Write tables, figures and the report. Returns a sentence for each that cannot be shown; the results stay."""
-    tables, notes = _tables(study, frames.runs)
+    tables, notes = built(study.tables, frames.runs)
     shown: dict[str, pd.DataFrame] = {}
+    beneath: dict[str, tuple[str, ...]] = {}
     for table in tables:
         for ending, text in table.files().items():
             store.write_text(f"tables/{table.spec.name}{ending}", text)
         shown |= table.frames()
+        beneath[list(table.frames())[-1]] = table.notes
+    captions: list[tuple[str, str]] = []
     with store.writing():
         for spec in study.figures:
+            caption = spec.caption or spec.name
             try:
                 save(draw(spec, frames.runs, frames.steps, frames.fields), store.folder / "figures", spec.name)
+                caption = " ".join((caption, *spec.on_seconds(frames.runs)))
             except FigureError as error:
                 notes.append(str(error))
-        captions = [(spec.name, spec.caption) for spec in study.figures]
+            captions.append((spec.name, caption))
         environments = environments_of(store.parts, frames.runs)
         left_out = [(excluded.label, excluded.reason) for excluded in study.excluded]
         findings = Results(study, frames.runs, frames.steps, frames.fields).findings
-        write_report(store.folder, study.question, shown, captions, frames.runs, environments, findings, left_out)
+        write_report(
+            store.folder, study.question, shown, captions, frames.runs, environments, findings, left_out, beneath
+        )
     return tuple(notes)

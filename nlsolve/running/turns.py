@@ -10,8 +10,8 @@ from nlsolve.results.frames import Part
 from nlsolve.running.engines.engine import Listener, Turn
 from nlsolve.running.retry import is_final, lacks_something
 from nlsolve.running.store.identity import way_of
-from nlsolve.running.store.standing import rounds_of
 from nlsolve.running.store.store import Store
+from nlsolve.running.timing.rounds import rounds_of
 from nlsolve.running.ways.ways import Ways
 from nlsolve.study.case import Case
 from nlsolve.study.study import Study
@@ -29,7 +29,7 @@ class Turns:
         self.timing, self.store = study.timing, store
         self.ways = Ways(study.cases, None if store is None else store.folder)
         self.parts: dict[str, Part] = {}
-        cases = study.cases if chosen is None else chosen
+        self.cases = cases = study.cases if chosen is None else chosen
         ours = {case.id for case in cases}
         self._others = [case for case in study.cases if case.id not in ours]
         pairs = [(turn, case) for turn in range(1, study.timing.rounds + 1) for case in cases]
@@ -69,13 +69,17 @@ class Turns:
         case = turn.case
         if case.way and not lacks_something(again.run):
             again = replace(again, run={**again.run, "start_way": way_of(case)})
-        part = self.parts[case.id] = _fastest(self.parts.get(case.id), again, self.timing)
+        part = self.parts[case.id] = self.joined(self.parts.get(case.id), again)
         self._ended[case.id] += 1
         self.ways.end(case)
         if self.store is not None:
             self.store.save(case, part)
             self.store.end(case)
         return part
+
+    def joined(self, before: Part | None, again: Part) -> Part:
+        """The part of a case that has been run once more."""
+        return _fastest(before, again, self.timing)
 
     def close(self) -> None:
         """Give up what this run has claimed."""

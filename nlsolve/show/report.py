@@ -33,11 +33,13 @@ def write_report(
     environments: Mapping[str, Mapping[str, str]] | None = None,
     findings: Sequence[Finding] = (),
     excluded: Sequence[tuple[str, str]] = (),
+    notes: Mapping[str, Sequence[str]] | None = None,
 ) -> Path:
     """Write folder/report.html and return its path.
 
     tables : name -> DataFrame, or its HTML, which is trusted; everything else is escaped.
     figures : (name, caption); figures/NAME.png in the folder is linked, and a missing one is said to be missing.
+    notes : name -> sentences beneath the table of this name.
     environments : what rows were computed with, by its name in their column `environment`.
     findings : what the study expects to find, judged.
     excluded : (label, reason) of each case that the study leaves out.
@@ -55,6 +57,7 @@ def write_report(
         findings=findings,
         excluded=grouped_by_reason(excluded),
         tables={name: _table(table) for name, table in tables.items()},
+        notes=notes or {},
         parameters=parameters,
         failures=[
             {

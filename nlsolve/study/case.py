@@ -37,6 +37,9 @@ COMMON: Mapping[str, Section] = {
 }
 """The sections of every case, besides `scene` and those that the scene's class declares."""
 
+METHOD = ("solver", "refresh", "operator", "predictor", "stop", "budget", "record", "limits")
+"""Sections that say how a problem is solved, and do not change what a unit of work costs."""
+
 DIGEST_LETTERS = 12
 
 LARGEST = 2**63 - 1
@@ -71,6 +74,12 @@ class Case:
         """The swept parameters with their values, as text for people: "solver.order = 20"."""
         words = [f"{'' if names_settings(name) else f'{name} = '}{self.parameters[name]}" for name in self.swept]
         return ", ".join(words) or "the only case"
+
+    @property
+    def problem(self) -> str:
+        """What the case solves, and with which linear solver: the same for cases that differ in method only."""
+        parts = ((name, part) for name, part in self.parts if name not in METHOD and part is not None)
+        return "".join(f"{name} {class_name(type(part))} {part.model_dump_json()}" for name, part in parts)
 
 
 class Invalid(Exception):

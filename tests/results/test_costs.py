@@ -32,7 +32,7 @@ from nlsolve.results.costs.lower_envelope import at_best, lower_envelope, under,
 from nlsolve.results.costs.unit_costs import COUNTS, UnitCosts
 from nlsolve.running.forecast import forecast
 from nlsolve.running.runner import run as run_study
-from nlsolve.running.timing import ORDER, calibrate, measure
+from nlsolve.running.timing.calibration import ORDER, calibrate, measure
 from nlsolve.show.figures import BaseFigure, FigureError, FigureSpec, draw
 from nlsolve.show.figures.style import ACCENT
 from nlsolve.show.tables import TableSpec, build
@@ -398,6 +398,16 @@ def test_a_tie_is_within_the_rounds_of_the_winner(factor: float, verdict: str) -
     assert rows[0]["regret"] == pytest.approx(factor - 1.0)
     counts = {SAME: "6 of 6 same, 6 with ties", TIE: "5 of 6 same, 6 with ties", OTHER: "5 of 6 same, 5 with ties"}
     assert rows[-1]["verdict"] == counts[verdict]
+
+
+def test_a_tie_in_the_exclusive_lane_is_within_the_interval_of_the_winner() -> None:
+    """There the slowest of many rounds says nothing."""
+    runs = told()
+    rival, chord = (runs["case"] == f"100 fine {name}" for name in ("newton", "chord"))
+    seconds = runs["seconds"].where(~rival, runs["seconds"][chord].item() / 1.04)
+    for high, verdict in ((1.03, OTHER), (1.05, TIE)):
+        changed = runs.assign(seconds=seconds, seconds_high=high * seconds, seconds_most=1.5 * seconds)
+        assert Crossover().of(records(changed))[0]["verdict"] == verdict
 
 
 def test_lines_of_exact_runs() -> None:

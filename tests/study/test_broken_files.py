@@ -294,6 +294,18 @@ FILES: dict[str, tuple[str | bytes, str]] = {
     ),
     "timing that is a number": ("timing = 3\n" + BASE, ", line 1: timing = 3: should be a table"),
     "no rounds": (BASE + "[timing]\nrounds = 0\n", ", line 8: timing.rounds = 0: should be greater than 0"),
+    "a lane that there is not": (
+        BASE + '[timing]\nlane = "fast"\n',
+        ", line 8: timing.lane = 'fast': should be 'shared' or 'exclusive'",
+    ),
+    "more of the fewest rounds than of the most": (
+        BASE + '[timing]\nlane = "exclusive"\nrounds = 31\n',
+        ", line 7: timing = {'lane': 'exclusive', 'rounds': 31}: most_rounds = 30 is less than rounds = 31, the fewest",
+    ),
+    "no precision": (
+        BASE + '[timing]\nlane = "exclusive"\nprecision = 0\n',
+        ", line 9: timing.precision = 0: should be greater than 0",
+    ),
     "a wrong value in the quick form": (
         BASE + '[quick]\n"stop.tolerance" = -1.0\n',
         ", line 8: stop.tolerance = -1.0: should be greater than 0",

@@ -36,7 +36,8 @@ neither.
 class Cell:
     """One linear solver at one size: the work and the seconds of its S strategies, arrays (S,).
 
-    seconds, slowest : of the fastest and of the slowest round.
+    seconds, slowest : of the fastest and of the slowest round; in the exclusive lane the median of the rounds and the
+        upper end of its interval.
     predicted : seconds by the cost model.
     """
 
@@ -56,7 +57,7 @@ class Cell:
 
     @property
     def verdict(self) -> str:
-        """SAME, TIE or OTHER. A tie: the predicted winner's fastest round is no slower than the winner's slowest."""
+        """SAME, TIE or OTHER. A tie: the predicted winner's seconds are no more than the winner's slowest."""
         predicted, measured = self.winners
         if predicted == measured:
             return SAME
@@ -126,9 +127,13 @@ class Crossover(Component):
                 )
             unit = pooled(members)
             assert unit is not None  # else there were no predictions
-            columns = ("factorizations", "seconds", "seconds_most", "seconds_predicted")
-            numbers = (np.array([number(run[name]) for run in members]) for name in columns)
-            found.append(Cell(size, backend, unit, strategies, *numbers))
+            work, seconds, most, predicted = (
+                np.array([number(run[name]) for run in members])
+                for name in ("factorizations", "seconds", "seconds_most", "seconds_predicted")
+            )
+            high = np.array([number(run.get("seconds_high")) for run in members])
+            slowest = np.where(np.isnan(high), most, high)
+            found.append(Cell(size, backend, unit, strategies, work, seconds, slowest, predicted))
         return found
 
     def _line_rows(self, cells: Sequence[Cell]) -> list[Row]:

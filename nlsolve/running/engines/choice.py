@@ -9,6 +9,7 @@ from importlib.util import find_spec
 import psutil
 
 from nlsolve.registry.problems import StudyError, did_you_mean
+from nlsolve.results.costs.lanes import EXCLUSIVE, SHARED
 from nlsolve.running.engines.engine import Engine
 from nlsolve.running.engines.execution import Debugger
 from nlsolve.running.engines.in_process import InProcess
@@ -51,6 +52,8 @@ def engine_for(
         raise StudyError(f"engine = {engine!r}: no such engine; {did_you_mean(engine or '', ENGINES)}")
     if scheduler is not None and engine != "dask":
         raise StudyError(f"scheduler = {scheduler!r}: only the engine 'dask' has one; add it, or drop the scheduler")
+    if timing.is_exclusive:
+        return _pinned(chosen, jobs, debugger, engine)
     if engine == "dask":
         if chosen == "none":
             raise StudyError("the engine 'dask' runs each case in a worker process: drop it, or isolation and debugger")
@@ -67,6 +70,29 @@ def engine_for(
         return here
     workers: Engine = import_module("nlsolve.running.engines.local").Workers(jobs_here(timing, jobs))
     return workers
+
+
+def _pinned(isolation: str, jobs: int | None, debugger: Debugger | None, engine: str | None) -> Engine:
+    """The engine of the exclusive lane. Raises StudyError for what it does not go together with."""
+    wishes = {
+        "engine = 'dask'": engine == "dask",
+        "a debugger": debugger is not None,
+        "isolation = 'none'": isolation == "none",
+        f"jobs = {jobs}": jobs not in (None, 1),
+    }
+    for wish, is_wished in wishes.items():
+        if is_wished:
+            raise StudyError(
+                f"timing.lane = {EXCLUSIVE!r}: the exclusive lane runs one case at a time in a worker process of this "
+                f"machine, and {wish} does not: drop it, or set the lane to {SHARED!r}"
+            )
+    if os.name != "posix":
+        raise StudyError(
+            f"timing.lane = {EXCLUSIVE!r}: the exclusive lane needs worker processes, which this system does not have: "
+            f"set the lane to {SHARED!r}"
+        )
+    pinned: Engine = import_module("nlsolve.running.engines.local").Pinned()
+    return pinned
 
 
 def _on_cluster(jobs: int | None, scheduler: str | None) -> Engine:

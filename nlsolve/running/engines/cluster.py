@@ -19,6 +19,7 @@ from distributed.scheduler import KilledWorker
 
 from nlsolve.contracts.status import InputError, Status
 from nlsolve.registry.problems import StudyError
+from nlsolve.results.costs.lanes import SHARED
 from nlsolve.results.frames import Part
 from nlsolve.running.engines import host
 from nlsolve.running.engines.engine import Turn
@@ -42,7 +43,7 @@ class Cluster(SideBySide):
     """
 
     def __init__(self, jobs: int | None, scheduler: str | None = None) -> None:
-        super().__init__()
+        super().__init__(SHARED)
         self.jobs, self.scheduler = jobs, scheduler
 
     def crew(self) -> Crew:

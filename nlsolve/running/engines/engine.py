@@ -68,10 +68,12 @@ SECONDS_BETWEEN_LOOKS = 0.1
 class Engine(ABC):
     """Runs cases.
 
+    lane : where the seconds of its cases come from.
     notes : one sentence for each thing that was done otherwise than asked.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, lane: str) -> None:
+        self.lane = lane
         self.notes: list[str] = []
 
     @abstractmethod

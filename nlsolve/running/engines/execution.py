@@ -12,10 +12,13 @@ from threadpoolctl import threadpool_limits
 from nlsolve.contracts.linear_solver import LinearSolver
 from nlsolve.contracts.status import CaseStopped, SolveError, Status
 from nlsolve.results.costs.cost_prediction import UNITS
+from nlsolve.results.costs.lanes import ALONE, EXCLUSIVE
 from nlsolve.results.frames import Part
 from nlsolve.running.engines.places import frames_of_error, origins, place
 from nlsolve.running.store.environment import environment_here, name_of
-from nlsolve.running.timing import CLOCKS, measure
+from nlsolve.running.timing.calibration import CLOCKS, measure
+from nlsolve.running.timing.cores import Load, cores_here
+from nlsolve.running.timing.rounds import measured_in
 from nlsolve.solving.simulate import Progress, Record, crashed, run_case
 from nlsolve.solving.way import Way
 from nlsolve.study.timing import Timing
@@ -29,6 +32,7 @@ def execute(
     parts: Any,
     timing: Timing,
     listen: Callable[[Progress], None],
+    lane: str = ALONE,
     debugger: Debugger | None = None,
     way: Way | None = None,
     share: Callable[[Way], None] | None = None,
@@ -36,21 +40,28 @@ def execute(
     """Run one case. Every error becomes a row that says so, and so does an exit; a KeyboardInterrupt is passed on.
 
     case, parameters, parts : see `Case`.
+    lane : where its seconds come from; in the exclusive lane the part has a round.
     debugger : is called with an error of the program or of a plugin before it becomes a row.
     way, share : see `simulate`.
     """
     try:
         with threadpool_limits(limits=1):
-            clock = CLOCKS[timing.clock]
+            clock, here, load = CLOCKS[timing.clock], cores_here(), Load()
             record = run_case(parts, listen, clock, way=way, share=share)
+            taken = load.share()
+            if lane == EXCLUSIVE and cores_here() != here:  # the case has left its core
+                lane = ALONE
             units = unit_costs(record, parts.linear, clock) if timing.calibrate else {}
     except (Exception, SystemExit, CaseStopped) as error:  # the one boundary at which a crash turns into a result
         if debugger is not None and not isinstance(error, CaseStopped):
             debugger(error)
         return part_of_error(case, parameters, parts, error)
-    timed = {"rounds": 1, "seconds_most": record.summary.get("seconds"), "clock": timing.clock}
+    timed = {"rounds": 1, "seconds_most": record.summary.get("seconds"), "clock": timing.clock, "lane": lane}
+    if lane == EXCLUSIVE:
+        timed |= {"load": taken, "core": min(here) if len(here) == 1 else None}
     row = {"case": case, **record.summary, **timed, **units, **parameters}
-    return _with_environment(Part(row, _of_case(case, record.steps), _of_case(case, record.fields)))
+    rounds = (measured_in(row),) if lane == EXCLUSIVE else ()
+    return _with_environment(Part(row, _of_case(case, record.steps), _of_case(case, record.fields), rounds=rounds))
 
 
 def unit_costs(record: Record, linear: LinearSolver, clock: Callable[[], float]) -> dict[str, float]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Generator
 
+from nlsolve.results.costs.lanes import ALONE
 from nlsolve.results.frames import Part
 from nlsolve.running.engines.engine import SECONDS_BETWEEN_LOOKS, Engine, Listener, Turn, Turns
 from nlsolve.running.engines.execution import Debugger, execute
@@ -18,7 +19,7 @@ class InProcess(Engine):
     """
 
     def __init__(self, debugger: Debugger | None = None) -> None:
-        super().__init__()
+        super().__init__(ALONE)
         self.debugger = debugger
 
     def parts(self, turns: Turns, timing: Timing, tell: Listener) -> Generator[tuple[Turn, Part], None, None]:
@@ -28,11 +29,11 @@ class InProcess(Engine):
                 time.sleep(SECONDS_BETWEEN_LOOKS)
                 continue
             tell(turn.event())
-            yield turn, run_here(turn, timing, tell, self.debugger)
+            yield turn, run_here(turn, timing, tell, self.lane, self.debugger)
 
 
-def run_here(turn: Turn, timing: Timing, tell: Listener, debugger: Debugger | None = None) -> Part:
+def run_here(turn: Turn, timing: Timing, tell: Listener, lane: str, debugger: Debugger | None = None) -> Part:
     """The part of a turn, run in this process."""
     case = turn.case
     listen = lambda progress: tell(turn.event(progress))  # noqa: E731
-    return execute(case.id, case.parameters, case.parts, timing, listen, debugger, turn.way, turn.share)
+    return execute(case.id, case.parameters, case.parts, timing, listen, lane, debugger, turn.way, turn.share)

@@ -9,6 +9,7 @@ from collections.abc import Generator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from nlsolve.results.costs.lanes import ALONE, EXCLUSIVE
 from nlsolve.results.frames import Part
 from nlsolve.running.engines.engine import SECONDS_BETWEEN_LOOKS, Engine, Listener, Turn, Turns
 from nlsolve.running.engines.in_process import run_here
@@ -101,7 +102,7 @@ class SideBySide(Engine):
                     else:
                         tell(turn.event())
                         try:
-                            crew.give(turn, packed(turn.case, timing, turn.way))
+                            crew.give(turn, packed(turn.case, timing, self.lane, turn.way))
                         except NotPortable as reason:
                             yield turn, self._here(turn, timing, tell, str(reason))
                 report = crew.report(SECONDS_BETWEEN_LOOKS if held else None)
@@ -124,4 +125,4 @@ class SideBySide(Engine):
 
     def _here(self, turn: Turn, timing: Timing, tell: Listener, reason: str) -> Part:
         self.note(f"{reason}: its cases were run in this process, one after the other and without limits")
-        return run_here(turn, timing, tell)
+        return run_here(turn, timing, tell, ALONE if self.lane == EXCLUSIVE else self.lane)

@@ -11,7 +11,7 @@ import pandas as pd
 from nlsolve.contracts.status import Status
 from nlsolve.results.verdicts import status_of
 from nlsolve.running.engines.choice import jobs_here
-from nlsolve.running.forecast import ASSUMPTION, forecast
+from nlsolve.running.forecast import ASSUMPTION, forecast, span_in_lane
 from nlsolve.running.planning.experience import seconds_expected
 from nlsolve.running.portions.condition import LEFT
 from nlsolve.running.portions.portion import portion_of
@@ -27,12 +27,14 @@ class Plan:
 
     cases : one row for each case that the run is for: its word in `plan` (kept, new, …), its swept parameters, its
         sizes and unit costs, and `seconds_expected`, from its start until it is written [s].
-    seconds : how long those to be computed take [s], `jobs` at a time.
+    seconds, seconds_most : how long those to be computed take [s], `jobs` at a time; in the exclusive lane, whose
+        number of rounds is not known before, at least and at most.
     basis : what the seconds rest on, in words.
     """
 
     cases: pd.DataFrame
     seconds: float
+    seconds_most: float
     jobs: int
     basis: str
 
@@ -64,7 +66,7 @@ def plan_of(
         return LEFT if entry is None else status_of(entry.measured).word
 
     chosen = study.cases if portion.is_whole else portion.cases(study, ending)
-    words = {case.id: standings.of(case).word for case in chosen}
+    words = {case: standing.word for case, standing in standings.of_all(chosen).items()}
     last = {case.id: entry for case in study.cases if (entry := standings.last(case)) is not None}
     known = {case: entry.elapsed for case, entry in last.items() if entry.elapsed == entry.elapsed}
     frame = forecast(study)
@@ -78,4 +80,8 @@ def plan_of(
     basis = (
         f"forecast: from the seconds of {cases} of this study in the folder, by what is swept" if known else ASSUMPTION
     )
-    return Plan(frame, float(left["seconds_expected"].sum()) / at_a_time, at_a_time, basis)
+    if study.timing.is_exclusive:
+        least, most = span_in_lane(study, {case: expected[case] for case in left["case"]})
+    else:
+        least = most = float(left["seconds_expected"].sum()) / at_a_time
+    return Plan(frame, least, most, at_a_time, basis)

@@ -16,7 +16,7 @@ import math
 import os
 import secrets
 import time
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -57,6 +57,7 @@ class Entry:
     frames : name -> size [bytes] of each frame that has a file.
     written : when, in seconds since 1970.
     elapsed : seconds from the start of the case until it was written [s]; NaN where that is not known.
+    rounds : see `Part`.
     """
 
     identity: Identity
@@ -65,6 +66,7 @@ class Entry:
     frames: Mapping[str, int]
     written: float
     elapsed: float = math.nan
+    rounds: Sequence[Row] = ()
 
     def run(self, names: Mapping[str, str]) -> Row:
         """The row of `runs` under other names of settings."""
@@ -135,6 +137,7 @@ class Parts:
             "frames": sizes,
             "written": time.time(),
             **({"elapsed": elapsed} if math.isfinite(elapsed) else {}),
+            "rounds": part.rounds,
         }
         write_text(self.folder, self.folder / CASES / f"{identity.key}.json", json.dumps(held, default=_plain))
 

@@ -15,6 +15,7 @@ from pydantic import ValidationError
 
 from nlsolve.contracts.status import STOPPED, Status
 from nlsolve.results.costs.cost_prediction import with_predictions
+from nlsolve.results.costs.lanes import EXCLUSIVE
 from nlsolve.results.frames import Frames, Part
 from nlsolve.results.parameters import names_settings
 from nlsolve.results.reference_error import with_reference_errors
@@ -158,7 +159,7 @@ def status_of_folder(folder: Path) -> FolderStatus:
     names = parts.names()
     planned = [case.key for case in described.cases] if described is not None else names
     entries = [entry for key in planned if (entry := parts.entry(key)) is not None]
-    running = tuple(claimed(folder))
+    running = tuple(key for key in claimed(folder) if key != EXCLUSIVE)
     done = {entry.identity.key for entry in entries}
     return FolderStatus(
         described,

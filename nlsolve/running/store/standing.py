@@ -4,16 +4,15 @@ from __future__ import annotations
 
 import time
 from collections import defaultdict
-from collections.abc import Collection, Iterable, Mapping
-from dataclasses import dataclass
-from typing import Any
+from collections.abc import Collection, Iterable, Sequence
+from dataclasses import dataclass, replace
 
 from nlsolve.contracts.status import Status
-from nlsolve.results.costs.cost_prediction import UNITS
-from nlsolve.results.verdicts import number, status_of
-from nlsolve.running.retry import is_final, is_tried_again
+from nlsolve.results.verdicts import status_of
+from nlsolve.running.retry import is_tried_again
 from nlsolve.running.store.identity import Identity, case_of, identity_of
 from nlsolve.running.store.parts import Entry, Parts
+from nlsolve.running.timing.rounds import comparisons, has_rounds, is_compared, is_over
 from nlsolve.study.case import Case
 from nlsolve.study.timing import Timing
 
@@ -58,8 +57,25 @@ class Standings:
         run = entry.run({})
         if is_tried_again(run, case.parts.limits, self.retry) and entry.written < self.begun:
             return Standing(identity, f"retried ({status_of(run).word})")
-        enough = is_final(run) or rounds_of(run, self.timing) >= self.timing.rounds
-        return Standing(identity, KEPT if enough else TIMED, entry)
+        return Standing(identity, KEPT if has_rounds(run, self.timing) else TIMED, entry)
+
+    def of_all(self, cases: Sequence[Case]) -> dict[str, Standing]:
+        """What the folder has of each case; in the exclusive lane the cases of a comparison are timed again together.
+
+        They are while one of them has no part that stands, or too few rounds.
+        """
+        found = {case.id: self.of(case) for case in cases}
+        for members in comparisons(cases) if self.timing.is_exclusive else ():
+            known = {case.id: found[case.id].entry for case in members}
+            timed = {
+                case: entry.run({})
+                for case, entry in known.items()
+                if entry is not None and is_compared(entry.run({}), self.timing)
+            }
+            kept = all(found[case].word == KEPT for case in known)
+            if not kept or not is_over(list(timed.values()), self.timing):
+                found |= {case: replace(found[case], word=TIMED) for case in timed if found[case].word == KEPT}
+        return found
 
     def last(self, case: Case) -> Entry | None:
         """How a case ended last, even if its source or a file has changed since; None when nothing is known of it."""
@@ -79,9 +95,3 @@ class Standings:
     def _latest(self, keys: Iterable[str]) -> Entry | None:
         found = [entry for entry in map(self.parts.entry, keys) if entry is not None]
         return max(found, key=lambda entry: entry.written, default=None)
-
-
-def rounds_of(run: Mapping[str, Any], timing: Timing) -> int:
-    """Number of rounds in which a case has been timed as the study asks; 0 for a case that crashed."""
-    known, units = number(run.get("rounds")), UNITS[0] in run or not timing.calibrate
-    return int(known) if known > 0 and units and run.get("clock") == timing.clock else 0

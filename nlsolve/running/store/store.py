@@ -17,6 +17,7 @@ from pathlib import Path
 import pandas as pd
 
 from nlsolve.contracts.status import Status
+from nlsolve.results.costs.lanes import EXCLUSIVE
 from nlsolve.results.frames import Frames, Part
 from nlsolve.results.verdicts import status_of
 from nlsolve.running.portions.condition import LEFT
@@ -26,6 +27,7 @@ from nlsolve.running.store.parts import (
     CASES,
     ENVIRONMENTS,
     WAYS,
+    Entry,
     Parts,
     StoreError,
     merge,
@@ -77,13 +79,13 @@ class Store:
         frames = self.parts.frames(standing.entry)
         if frames is None:
             return None
-        return Part(standing.entry.run(names_in(case)), *frames)
+        return _part(standing.entry, case, frames)
 
     def finished(self, case: Case) -> Part | None:
         """The part of a case as `load` gives it, also where it is to be tried again; None when there is none."""
         entry = self.parts.entry(identity_of(case).key)
         frames = None if entry is None else self.parts.frames(entry)
-        return None if entry is None or frames is None else Part(entry.run(names_in(case)), *frames)
+        return None if entry is None or frames is None else _part(entry, case, frames)
 
     def ending(self, case: Case) -> str:
         """The word of the status with which a case ended last, or `LEFT`."""
@@ -97,6 +99,11 @@ class Store:
         if taken:
             self._started[case.id] = time.monotonic()
         return taken
+
+    def begin_timing(self) -> bool:
+        """Claim the exclusive lane of the folder until the end of the run; False while another run has it."""
+        with self.writing():
+            return self._claims.take(EXCLUSIVE)
 
     def save(self, case: Case, part: Part) -> None:
         """Keep a part. It is not kept when a file that the case reads has changed since the case was looked up."""
@@ -115,7 +122,7 @@ class Store:
 
     def unchanged(self) -> tuple[Frames, tuple[str, ...]] | None:
         """All frames and the notes of the last run, where nothing is left to run, to write or to show; else None."""
-        found = [self._standings.of(case) for case in self.study.cases]
+        found = list(self._standings.of_all(self.study.cases).values())
         entries = [standing.entry for standing in found if standing.entry is not None and standing.word == KEPT]
         if len(entries) < len(found):
             return None
@@ -154,3 +161,8 @@ class Store:
         """Turn a failure of the file system into a StoreError."""
         with writing(self.folder):
             yield
+
+
+def _part(entry: Entry, case: Case, frames: tuple[pd.DataFrame, pd.DataFrame]) -> Part:
+    """A part as it was saved, under this study's names of settings."""
+    return Part(entry.run(names_in(case)), *frames, rounds=tuple(entry.rounds))

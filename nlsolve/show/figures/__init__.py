@@ -61,6 +61,7 @@ FigureSpec = Annotated[
 
 def draw(spec: BaseFigure, runs: pd.DataFrame, steps: pd.DataFrame, fields: pd.DataFrame) -> plotting.Figure:
     """The declared figure of these results. Raises FigureError when there is nothing to draw."""
+    spec.on_seconds(runs)
     with plotting.rc_context(STYLE):
         figure = plotting.Figure(figsize=(COLUMN, 0.72 * COLUMN), layout="constrained")
         spec.paint(figure, Frames(runs, steps, fields))

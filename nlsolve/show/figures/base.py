@@ -11,9 +11,11 @@ import pandas as pd
 from pydantic import Field
 
 from nlsolve.contracts.component import Component
-from nlsolve.results.columns import RENAMED, no_such_column
-from nlsolve.results.frames import Frames
-from nlsolve.results.selection import Names, Where
+from nlsolve.registry.problems import StudyError
+from nlsolve.results.columns import RENAMED, is_timed, no_such_column
+from nlsolve.results.costs.lanes import ONE, Lanes, on_seconds
+from nlsolve.results.frames import Frames, rows_of
+from nlsolve.results.selection import Names, Where, fits
 from nlsolve.show import plotting
 
 
@@ -37,9 +39,25 @@ class BaseFigure(Component, ABC):
         description="parameters that tell curves or panels apart; absent: those that differ, where a case is a curve",
     )
 
+    lanes: Lanes = ONE
+
     def columns_of_runs(self) -> dict[str, Names]:
         """Field -> the columns of `runs` that it names, which a study checks before it is run."""
         return {"where": tuple(self.where), "group": self.group}
+
+    @property
+    def shows_seconds(self) -> bool:
+        """Whether it shows what was read from a clock."""
+        return any(is_timed(name) for names in self.columns_of_runs().values() for name in names)
+
+    def on_seconds(self, runs: pd.DataFrame) -> tuple[str, ...]:
+        """What is said of the seconds that it shows. Raises FigureError where they may not come from several lanes."""
+        if not self.shows_seconds or runs.empty:
+            return ()
+        try:
+            return on_seconds((run for run in rows_of(runs) if fits(run, self.where)), self.lanes)
+        except StudyError as error:
+            raise self.refuse(str(error)) from error
 
     @abstractmethod
     def paint(self, figure: plotting.Figure, frames: Frames) -> None:

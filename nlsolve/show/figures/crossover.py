@@ -38,6 +38,10 @@ class CrossoverFigure(BaseFigure):
     def columns_of_runs(self) -> dict[str, Names]:
         return {**super().columns_of_runs(), "strategy": self.strategy, "size": self.size, "backend": self.backend}
 
+    @property
+    def shows_seconds(self) -> bool:
+        return True
+
     def paint(self, figure: plotting.Figure, frames: Frames) -> None:
         for column in (*self.strategy, *self.size, *self.backend):
             self.require(column, frames.runs, "runs")

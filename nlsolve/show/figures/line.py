@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from nlsolve.contracts.status import Status
+from nlsolve.results.columns import STEPS
 from nlsolve.results.frames import Frames
 from nlsolve.results.selection import Names
 from nlsolve.show import plotting
@@ -36,6 +37,11 @@ class LineFigure(BaseFigure):
     def columns_of_runs(self) -> dict[str, Names]:
         own = {"x": (self.x,), "y": self.y} if self.source == "runs" else {}
         return {**super().columns_of_runs(), **own}
+
+    @property
+    def shows_seconds(self) -> bool:
+        of_steps = (self.x, *self.y) if self.source == "steps" else ()
+        return super().shows_seconds or any(name in STEPS and STEPS[name].timed for name in of_steps)
 
     def paint(self, figure: plotting.Figure, frames: Frames) -> None:
         frame = frames.steps if self.source == "steps" else frames.runs

@@ -6,8 +6,8 @@ strategy is cheapest where (`crossover`).
 
 from __future__ import annotations
 
-from nlsolve.show.tables.layout import build, check
+from nlsolve.show.tables.layout import build, built, check
 from nlsolve.show.tables.spec import TableSpec
 from nlsolve.show.tables.table import Table
 
-__all__ = ["Table", "TableSpec", "build", "check"]
+__all__ = ["Table", "TableSpec", "build", "built", "check"]

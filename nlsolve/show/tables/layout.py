@@ -11,6 +11,7 @@ import pandas as pd
 from nlsolve.registry.problems import ABSENT, Problem, Source, StudyError
 from nlsolve.results.aggregates import key_of
 from nlsolve.results.columns import RUNS, is_measured, no_such_column
+from nlsolve.results.costs.lanes import on_seconds
 from nlsolve.results.frames import rows_of
 from nlsolve.results.selection import fits, same
 from nlsolve.results.verdicts import AT_A_SOLUTION, OUTCOME, SOLVED, SPEEDUP, Run, number, outcome, solved, status_of
@@ -22,7 +23,10 @@ MEASURED = (*RUNS, OUTCOME, SOLVED, SPEEDUP)
 
 
 def build(spec: TableSpec, runs: pd.DataFrame) -> Table:
-    """The declared table of these runs. Raises StudyError when two runs claim one cell or a name is unknown."""
+    """The declared table of these runs.
+
+    Raises StudyError when two runs claim one cell, a name is unknown, or seconds come from several lanes.
+    """
     measured, judged = rows_of(runs), (spec.accepted, spec.error)
     known = [
         {**run, OUTCOME: outcome(run, *judged), SOLVED: solved(run, *judged), SPEEDUP: _speedup(spec, run, measured)}
@@ -31,6 +35,7 @@ def build(spec: TableSpec, runs: pd.DataFrame) -> Table:
     problems = check(spec, known)
     if problems:
         raise StudyError(*(problem.sentence(Source(f"table {spec.name!r}")) for problem in problems))
+    notes = _on_seconds(spec, known)
     chosen = spec.aggregated([run for run in known if fits(run, spec.where)])
     rows = _numbered(key_of(spec.labels, run) for run in chosen)
     columns = _numbered(key for run in chosen for key in _column_keys(spec, run))
@@ -43,9 +48,20 @@ def build(spec: TableSpec, runs: pd.DataFrame) -> Table:
     index, header = _index(list(rows), spec.labels), _index(list(columns), names)
     frame = pd.DataFrame(cells, index=index, columns=header, dtype=object)
     if spec.paper is None:
-        return Table(spec, frame)
+        return Table(spec, frame, notes=notes)
     compared = spec.paper.compare(cells, spec.text)
-    return Table(spec, frame, pd.DataFrame(compared, index=index, columns=header, dtype=object))
+    return Table(spec, frame, pd.DataFrame(compared, index=index, columns=header, dtype=object), notes)
+
+
+def built(specs: Iterable[TableSpec], runs: pd.DataFrame) -> tuple[list[Table], list[str]]:
+    """The declared tables that these runs can fill, and a sentence for each of the others."""
+    tables, sentences = [], []
+    for spec in specs:
+        try:
+            tables.append(build(spec, runs))
+        except StudyError as error:
+            sentences.append(str(error))
+    return tables, sentences
 
 
 def check(spec: TableSpec, runs: Sequence[Run], measured: Iterable[str] = MEASURED) -> list[Problem]:
@@ -102,6 +118,17 @@ def check(spec: TableSpec, runs: Sequence[Run], measured: Iterable[str] = MEASUR
             expected = f"should be {height} lists of {width} numbers, as the table has; there are lists of {lengths}"
             return [Problem(("paper", "values"), [list(row) for row in spec.paper.values], expected)]
     return []
+
+
+def _on_seconds(spec: TableSpec, runs: Sequence[Run]) -> tuple[str, ...]:
+    """What is said of the seconds that a table shows or compares; see `on_seconds`."""
+    if not spec.shows_seconds:
+        return ()
+    shown = [run for run in runs if fits(run, spec.where) or (spec.against and fits(run, dict(spec.against)))]
+    try:
+        return on_seconds(shown, spec.lanes)
+    except StudyError as error:
+        raise StudyError(f"table {spec.name!r}: {error}") from error
 
 
 def _speedup(spec: TableSpec, run: Run, runs: Sequence[Run]) -> float:

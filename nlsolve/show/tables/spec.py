@@ -10,7 +10,9 @@ from pydantic import Field, field_validator, model_validator
 
 from nlsolve.contracts.component import Component
 from nlsolve.results.aggregates import COUNT, NO_RUN, WITHIN, Cheapest, counted, success
+from nlsolve.results.columns import is_timed
 from nlsolve.results.costs.crossover import Crossover
+from nlsolve.results.costs.lanes import ONE, Lanes
 from nlsolve.results.published_values import PublishedValues
 from nlsolve.results.selection import Names, Scalar, Where
 from nlsolve.results.verdicts import ACCEPTED, SOLVED, SPEEDUP, Run
@@ -57,6 +59,7 @@ class TableSpec(Component):
     count: bool = Field(
         False, description="cells count runs, such as rows = variant, columns = outcome; value = solved: those solved"
     )
+    lanes: Lanes = ONE
     paper: PublishedValues | None = Field(None, description="a paper's values to compare with")
 
     @field_validator("format")
@@ -121,6 +124,12 @@ class TableSpec(Component):
     def aggregates(self) -> bool:
         """Whether a cell says something of many runs, and not of one."""
         return self.count or self.success or self.cheapest is not None or self.crossover is not None
+
+    @property
+    def shows_seconds(self) -> bool:
+        """Whether cells hold what was read from a clock, or are chosen by it."""
+        names = (*self.value, *(() if self.cheapest is None else (self.cheapest.cost,)))
+        return self.crossover is not None or SPEEDUP in names or any(map(is_timed, names))
 
     def aggregated(self, runs: Sequence[Run]) -> Sequence[Run]:
         """What the cells are filled from: the chosen runs themselves, or a row for many of them."""

@@ -19,11 +19,13 @@ class Table:
 
     cells : numbers and words of runs, the status of a run that failed, NaN where there is no run.
     comparison : "measured (paper) verdict" in the same layout; None without paper values.
+    notes : sentences that stand beneath, on where its seconds come from.
     """
 
     spec: TableSpec
     cells: pd.DataFrame
     comparison: pd.DataFrame | None = None
+    notes: tuple[str, ...] = ()
 
     @property
     def words(self) -> pd.DataFrame:
@@ -57,21 +59,24 @@ class Table:
         return {title: _flat(frame) for title, frame in self.frames().items()}
 
     def rich(self) -> list[RichTable]:
-        """What `frames` holds, for a terminal."""
-        return [_rich(title, frame) for title, frame in self.frames().items()]
+        """What `frames` holds, for a terminal, the notes beneath."""
+        tables = [_rich(title, frame) for title, frame in self.frames().items()]
+        tables[-1].caption = escape("\n".join(self.notes)) or None
+        return tables
 
     def markdown(self) -> str:
-        """What `frames` holds, as GitHub writes tables."""
+        """What `frames` holds, as GitHub writes tables, the notes beneath."""
         parts = [_flat(frame).to_markdown(index=False, disable_numparse=True) for frame in self.frames().values()]
-        return "\n\n".join(parts) + "\n"
+        return "\n\n".join([*parts, *self.notes]) + "\n"
 
     def latex(self) -> str:
-        """A captioned booktabs table of the comparison, or of the cells where there is none."""
+        """A captioned booktabs table of the comparison, or of the cells where there is none; the notes as comments."""
         frame = self.words if self.comparison is None else self.comparison
         frame = frame.rename(index=_word, columns=_word).rename_axis(index=_escaped, columns=_escaped)
         styler = frame.style.format(escape="latex").format_index(escape="latex", axis=0)
         styler = styler.format_index(escape="latex", axis=1)
-        return styler.to_latex(hrules=True, caption=_escaped(self.spec.caption) or None, label=f"tab:{self.spec.name}")
+        text = styler.to_latex(hrules=True, caption=_escaped(self.spec.caption) or None, label=f"tab:{self.spec.name}")
+        return text + "".join(f"% {note}\n" for note in self.notes)
 
 
 def _flat(frame: pd.DataFrame) -> pd.DataFrame:

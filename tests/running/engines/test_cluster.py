@@ -19,6 +19,8 @@ from distributed.scheduler import KilledWorker
 import nlsolve
 from nlsolve import Event
 from nlsolve.registry.problems import StudyError
+from nlsolve.results.columns import is_timed
+from nlsolve.results.costs.lanes import SHARED
 from nlsolve.running.engines import choice, cluster
 from nlsolve.running.engines.processes.travel import Unreadable, packed
 from nlsolve.running.runner import run
@@ -40,7 +42,7 @@ def document(*solvers: Any, **limits: Any) -> dict[str, Any]:
 
 def without_seconds(frame: pd.DataFrame) -> pd.DataFrame:
     """The rows without what a clock has measured."""
-    measured = [name for name in frame if name.startswith("seconds") or name == "factor_solve_ratio"]
+    measured = [name for name in frame if is_timed(name) or name in ("lane", "seconds_predicted")]
     return frame.drop(columns=measured).reset_index(drop=True)
 
 
@@ -152,7 +154,7 @@ class Ended:
 
 def test_what_a_cluster_lacks_is_a_sentence_and_no_row():
     study = Study.from_dict(document({"kind": "newton"}))
-    task = packed(study.cases[0], Timing())
+    task = packed(study.cases[0], Timing(), SHARED)
 
     def ending(status: str, found: Any = None) -> Any:
         return cluster._ending(task, Ended(status, found))  # type: ignore[arg-type]

@@ -22,7 +22,7 @@ import nlsolve
 from nlsolve import Event, Results, Status
 from nlsolve.plugin import NonlinearSolver
 from nlsolve.registry.problems import StudyError
-from nlsolve.results.columns import RUNS
+from nlsolve.results.columns import RUNS, is_timed
 from nlsolve.running.engines.processes import process
 from nlsolve.running.engines.processes.process import BOOT, END_OF_OUTPUT
 from nlsolve.running.runner import run
@@ -117,7 +117,7 @@ def test_all_other_cases_are_as_in_one_process(everything):
     sound = [kind for kind, (status, *_) in ENDINGS.items() if status == "converged"]
     sound = [kind for kind in sound if kind not in ("forks", "works-elsewhere", "changes-folder", "patches-clocks")]
     serial = run(document(*(BY_KIND[kind]() for kind in sound)), isolation="none").runs.astype(object)
-    compared = [name for name in RUNS if not name.startswith("seconds") and name != "factor_solve_ratio"]
+    compared = [name for name in RUNS if not is_timed(name) and name != "lane"]
     parallel = everything.runs.astype(object).set_index("case").loc[serial["case"]].reset_index()
     same = [frame[compared].where(frame[compared].notna(), None) for frame in (parallel, serial)]
     pd.testing.assert_frame_equal(*same, check_dtype=False)

@@ -12,6 +12,7 @@ from typer.testing import CliRunner
 from nlsolve.cli.app import app
 from nlsolve.contracts.status import Status
 from nlsolve.registry.problems import StudyError
+from nlsolve.results.columns import is_timed
 from nlsolve.results.frames import Part
 from nlsolve.running.portions.condition import is_like
 from nlsolve.running.portions.portion import portion_of
@@ -205,7 +206,7 @@ def test_what_a_study_expects_waits_for_all_cases(tmp_path):
 
 def without_seconds(runs: pd.DataFrame) -> pd.DataFrame:
     """The rows without what a clock has measured."""
-    measured = [name for name in runs if name.startswith("seconds") or name in ("factor_solve_ratio", "predicted")]
+    measured = [name for name in runs if is_timed(name) or name in ("lane", "predicted", "seconds_predicted")]
     return runs.drop(columns=measured).reset_index(drop=True)
 
 

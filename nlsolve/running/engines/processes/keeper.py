@@ -13,7 +13,7 @@ from nlsolve.results.frames import Part
 from nlsolve.running.engines.execution import part_without_record
 from nlsolve.running.engines.places import frames_of_dump, place
 from nlsolve.running.engines.processes.process import WorkerProcess
-from nlsolve.running.engines.processes.travel import Ended, Ready, Task, Unreadable
+from nlsolve.running.engines.processes.travel import Ended, Ready, Task, Unreadable, Warm
 from nlsolve.running.engines.processes.worker import PLACE_SIGNAL, SIGNALS, limit_of
 from nlsolve.solving.simulate import Progress
 from nlsolve.solving.way import Way
@@ -40,12 +40,13 @@ class Keeper:
     """One worker process after the other, for one task at a time.
 
     folder : the folder in which the processes work; absent: that of this process.
+    core : the core that they are kept on; absent: whichever there is.
     notes : sentences on what the worker lacks.
     ending : is set, by any thread, to stop whatever runs.
     """
 
-    def __init__(self, folder: str | None = None) -> None:
-        self.folder, self.notes = folder, list[str]()
+    def __init__(self, folder: str | None = None, core: int | None = None) -> None:
+        self.folder, self.core, self.notes = folder, core, list[str]()
         self.worker: WorkerProcess | None = None
         self.ending = threading.Event()
 
@@ -74,7 +75,7 @@ class Keeper:
         """A worker that is ready; None when ending. Raises InputError when none can be started."""
         if self.worker is not None:
             return self.worker
-        self.worker = WorkerProcess(self.folder)
+        self.worker = WorkerProcess(self.folder, self.core)
         while not self.ending.is_set():
             answer = self.worker.answer(TICK)
             if isinstance(answer, Ready):
@@ -101,6 +102,9 @@ class Keeper:
             answer = worker.answer(TICK)
             if isinstance(answer, Progress | Way):
                 tell(answer)
+            elif isinstance(answer, Warm):
+                worker.begin()
+                begun = _now()
             elif isinstance(answer, Unreadable):
                 return answer
             elif isinstance(answer, Ended):

@@ -53,16 +53,17 @@ class WorkerProcess:
     """A worker process and all processes that descend from it.
 
     folder : the folder in which it works; absent: that of this process.
+    core : the core that it is kept on; absent: whichever there is.
     gone : whether it will not answer any more.
     begun : when it was started, by the monotonic clock [s].
     """
 
-    def __init__(self, folder: str | None = None) -> None:
+    def __init__(self, folder: str | None = None, core: int | None = None) -> None:
         self.connection, theirs = multiprocessing.Pipe()
         self._faults = tempfile.TemporaryFile(buffering=0)  # noqa: SIM115  # closed by `kill`
         self._output, written = os.pipe()
         os.set_blocking(self._output, False)
-        argument = {"path": sys.path, "main": [theirs.fileno(), self._faults.fileno(), os.getpid()]}
+        argument = {"path": sys.path, "main": [theirs.fileno(), self._faults.fileno(), os.getpid(), core]}
         self.begun = _now()
         self._popen = subprocess.Popen(
             [sys.executable, "-P", "-c", BOOT, json.dumps(argument)],

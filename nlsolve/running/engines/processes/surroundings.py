@@ -12,6 +12,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+from nlsolve.running.timing.cores import cores_here
+
 CLOCKS = ("time", "time_ns", "monotonic", "perf_counter", "process_time", "thread_time", "sleep")
 """Functions of `time` that a plugin might replace."""
 
@@ -59,6 +61,7 @@ class Surroundings:
     handlers: Mapping[int, Any] = field(default_factory=_handlers)
     streams: tuple[Any, Any] = field(default_factory=lambda: (sys.stdout, sys.stderr))
     threads: int = field(default_factory=threading.active_count)
+    cores: frozenset[int] = field(default_factory=cores_here)
     seconds_of_children: float = field(default_factory=_seconds_of_children)
 
     def changed(self) -> str:
@@ -68,6 +71,7 @@ class Surroundings:
             "a clock": _clocks() != self.clocks,
             "a handler of signals": _handlers() != self.handlers,
             "the output": (sys.stdout, sys.stderr) != self.streams,
+            "the cores it may use": cores_here() != self.cores,
             "threads": threading.active_count() > self.threads,
             "processes": has_children(),
         }

@@ -37,6 +37,7 @@ class Task:
     """A case on its way to a worker.
 
     sections : each component, pickled by itself, so that the one that fails can be named.
+    lane : where its seconds come from.
     files : module -> its file, for the modules of the components, which need not be installed.
     way : the way to its first state, where another case has solved it.
     code : package -> version and fingerprint of its source, as `code_of` the components, where they must be the same.
@@ -48,6 +49,7 @@ class Task:
     files: Mapping[str, str]
     limits: Limits
     timing: Timing
+    lane: str
     way: Way | None = None
     code: Mapping[str, str] = field(default_factory=dict)
 
@@ -74,6 +76,11 @@ class Ready:
 
 
 @dataclass(frozen=True)
+class Warm:
+    """A worker has run a case for the first time, of which nothing is kept; the run that counts begins."""
+
+
+@dataclass(frozen=True)
 class Ended:
     """A case has ended.
 
@@ -91,13 +98,13 @@ class Unreadable:
     reason: str
 
 
-def packed(case: Case, timing: Timing, way: Way | None = None) -> Task:
+def packed(case: Case, timing: Timing, lane: str, way: Way | None = None) -> Task:
     """The task of a case. Raises NotPortable when a component cannot be pickled, or is of the running script's own."""
     sections = {name: _packed(name, value) for name, value in case.parts}
     modules = {type(component).__module__ for component in components_in(value for _, value in case.parts)}
     files = {name: getattr(sys.modules.get(name), "__file__", None) for name in sorted(modules)}
     known = {name: file for name, file in files.items() if file is not None}
-    return Task(case.id, dict(case.parameters), sections, known, case.parts.limits, timing, way)
+    return Task(case.id, dict(case.parameters), sections, known, case.parts.limits, timing, lane, way)
 
 
 class _Pickler(pickle.Pickler):

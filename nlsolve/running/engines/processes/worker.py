@@ -25,12 +25,15 @@ from typing import Any, NoReturn
 from threadpoolctl import threadpool_info
 
 from nlsolve.contracts.status import CaseStopped, Status
+from nlsolve.results.costs.lanes import EXCLUSIVE
 from nlsolve.results.frames import Part
 from nlsolve.results.verdicts import doubt
 from nlsolve.running.engines.execution import execute, part_of_error
 from nlsolve.running.engines.places import frames_from, origins, place
 from nlsolve.running.engines.processes.surroundings import Surroundings
-from nlsolve.running.engines.processes.travel import Ended, NotPortable, Ready, Sections, Task, Unreadable
+from nlsolve.running.engines.processes.travel import Ended, NotPortable, Ready, Sections, Task, Unreadable, Warm
+from nlsolve.running.timing.cores import stay_on
+from nlsolve.running.timing.rounds import is_compared
 from nlsolve.solving.simulate import Progress
 
 SIGNALS = {Status.TIMED_OUT: signal.SIGXCPU, Status.OUT_OF_MEMORY: signal.SIGUSR2}
@@ -63,6 +66,7 @@ class Worker:
         self.task: Task | None = None
         self.origins: Mapping[str, str] = {}
         self.told = 0.0
+        self.warm: set[str] = set()
 
     def prepare(self) -> None:
         """Make the process one that ends with its runner, says where it dies, and can be stopped."""
@@ -88,16 +92,20 @@ class Worker:
             self.send(self.answer(task), task)
 
     def answer(self, task: Task) -> Ended | Unreadable:
-        """Run one case."""
+        """Run one case; in the exclusive lane twice when it is the first time, as the first run warms the process up:
+        its imports, memory and caches.
+        """
         before, parts = Surroundings(), Sections()
         self.task, self.origins, self.told = task, {}, 0.0
         try:
             _allow(task.limits.bytes)
             parts = task.parts()
             self.origins = origins(parts)
-            part = execute(
-                task.case, task.parameters, parts, task.timing, self.listen, way=task.way, share=self.connection.send
-            )
+            part = self.run(task, parts)
+            if task.lane == EXCLUSIVE and task.case not in self.warm and is_compared(part.run, task.timing):
+                self.warm.add(task.case)
+                self.send(Warm())
+                part = self.run(task, task.parts())
         except NotPortable as reason:
             return Unreadable(str(reason))
         except BaseException as error:  # also a KeyboardInterrupt, which is nobody's at a keyboard
@@ -110,13 +118,20 @@ class Worker:
             stream.flush()
         return Ended(_doubted(part, before.doubt()), before.changed())
 
+    def run(self, task: Task, parts: Sections) -> Part:
+        """One run of a case."""
+        share = self.connection.send
+        return execute(
+            task.case, task.parameters, parts, task.timing, self.listen, task.lane, way=task.way, share=share
+        )
+
     def listen(self, progress: Progress) -> None:
         """Report progress, not too often."""
         if _now() - self.told > SECONDS_BETWEEN_PROGRESS:
             self.told = _now()
             self.connection.send(progress)
 
-    def send(self, answer: Ready | Ended | Unreadable, task: Task | None = None) -> None:
+    def send(self, answer: Ready | Warm | Ended | Unreadable, task: Task | None = None) -> None:
         """Send an answer; a part that cannot be sent becomes one that says so."""
         try:
             data = pickle.dumps(answer, pickle.HIGHEST_PROTOCOL)
@@ -173,8 +188,10 @@ def _linux(option: int, value: int) -> None:
         ctypes.CDLL(None).prctl(option, value, 0, 0, 0)
 
 
-def main(connection: int, faults: int, runner: int) -> None:
-    """Serve the runner with process id `runner` over two descriptors."""
+def main(connection: int, faults: int, runner: int, core: int | None = None) -> None:
+    """Serve the runner with process id `runner` over two descriptors, on one core if one is named."""
+    if core is not None:
+        stay_on(frozenset({core}))
     import_module("nlsolve.plugin")  # which plugins import, so that the first case need not wait for it
     worker = Worker(Connection(connection), faults)
     worker.prepare()
