@@ -86,15 +86,17 @@ LIMITS: dict[str, Limit] = {
         ACCEPTED / SAFETY,
         "a solution with more nodes differs: choose a finer or evener spacing, or a higher penalty",
     ),
-    "audit.gained_power": Limit(0.0, "the law gives off power, S:ε̇ < 0: make its viscosity positive"),
+    "audit.gained_power": Limit(0.0, "the law gives off power, S:ε̇ < 0: make its viscosity positive", always=False),
     "audit.falling_stress": Limit(
-        FALLING, "the stress of the law falls while the rate grows: choose a law whose stress grows"
+        FALLING, "the stress of the law falls while the rate grows: choose a law whose stress grows", always=False
     ),
     "audit.exact": Limit(
-        FAR, "the exact solution is far from one whose error is estimated as small: check it, or choose a finer spacing"
+        FAR,
+        "the exact solution is far from one whose error is estimated as small: check it, or choose a finer spacing",
+        always=False,
     ),
     "audit.units": Limit(
-        1.0, "the numbers look like SI units: give lengths in mm, stresses in MPa, densities in t/mm³"
+        1.0, "the numbers look like SI units: give lengths in mm, stresses in MPa, densities in t/mm³", always=False
     ),
     "audit.heating": Limit(50.0, "temperature is constant here: the material would heat up and soften", doubt=False),
 }
