@@ -10,7 +10,7 @@ from nlsolve.contracts.continuum.law import ConstitutiveLaw, PowerForm, local_in
 from nlsolve.contracts.continuum.terms import NodeMotion, Physics, Recording, TimeSteps
 from nlsolve.contracts.linear_solver import Factors, LinearSolver
 from nlsolve.contracts.nonlinear_solver import KeptTangent, NonlinearSolver, Step
-from nlsolve.contracts.problem import Expansion, NonlinearProblem
+from nlsolve.contracts.problem import Expansion, NonlinearProblem, norm, unit
 from nlsolve.contracts.rules.globalization import Globalization, Search
 from nlsolve.contracts.rules.homotopy_form import HomotopyForm, Recurrence
 from nlsolve.contracts.rules.operator import Assembly, IterationOperator
@@ -84,6 +84,8 @@ __all__ = [
     "cached_jacobian",
     "hookimpl",
     "local_index",
+    "norm",
     "stress",
     "tangent_moduli",
+    "unit",
 ]

@@ -11,13 +11,22 @@ import scipy.sparse as sp
 from nlsolve.algebra.colouring import Colouring
 from nlsolve.contracts.problem import Expansion, NonlinearProblem
 from nlsolve.contracts.status import InputError, SolveError, Status
-from nlsolve.series import Array, NoSeriesHere, Series
+from nlsolve.series import Array, NoSeries, NoSeriesHere, Series
 
 NUMBERS = "iuf"
 """Kinds of NumPy types that are accepted as real numbers."""
 
 LONGEST_VALUE = 60
 """Longest wrong value that a sentence repeats, in characters."""
+
+WIDEST = 2000
+"""Most columns, or groups of columns, of a Jacobian that is made only to judge a state."""
+
+PROBES = 16
+"""Random directions by which the terms of the equations of wider ones are estimated."""
+
+STEP = float(np.sqrt(np.finfo(float).eps))
+"""Step of a difference over the size of the unknown."""
 
 UNFIT = (AttributeError, IndexError, TypeError, ValueError)
 """What Python and NumPy raise when a formula for arrays asks of a series what only an array has."""
@@ -36,9 +45,10 @@ class FormulaProblem(NonlinearProblem):
     columns : True when F acts on each column of an array (U, C), as the formula of a `System` does: one run then serves
         all groups of columns. Otherwise F is run once for each group.
     is_gradient : whether F is the gradient of a convex potential.
+    typical_sizes : see `NonlinearProblem`.
 
-    Its scale is 1: the published sets are judged by an absolute residual (‖F‖∞ < 1e-6 for the 23 problems), and F alone
-    does not tell the size of what cancels in it. `stop.tolerance` therefore is a bound on ‖F‖₂ itself.
+    F alone does not tell the size of what cancels in it, and has no scale: its states are judged by its Jacobian,
+    equation by equation (`ByEquation`). One that has no Jacobian is judged by differences of F.
     """
 
     def __init__(
@@ -49,8 +59,9 @@ class FormulaProblem(NonlinearProblem):
         jacobian: Callable[[Array], Any] | None = None,
         columns: bool = False,
         is_gradient: bool = False,
+        typical_sizes: Array | None = None,
     ) -> None:
-        self.is_gradient = is_gradient
+        self.is_gradient, self.typical_sizes = is_gradient, typical_sizes
         self._formula, self._given, self._columns = formula, jacobian, columns
         self._colouring = Colouring(pattern, size)
 
@@ -86,6 +97,34 @@ class FormulaProblem(NonlinearProblem):
             except OVERFLOWS as error:
                 raise SolveError(Status.NON_FINITE, f"jacobian(u) has no value here: {_said(error)}") from error
         return self._colouring.unpack(self.derivative(u, self._colouring.seeds))
+
+    def linearisation(self, u: Array, sizes: Array) -> Any:
+        """J(u), by differences where F has none; None where it has more than `WIDEST` groups of columns."""
+        if self._given is None and self._colouring.seeds.shape[1] > WIDEST:
+            return None
+        try:
+            return self.jacobian(u)
+        except SolveError as error:
+            if error.status is not Status.NOT_APPLICABLE:
+                raise
+        steps = np.where(sizes > 0.0, sizes, 1.0)
+        product = self._colouring.unpack(self._differences(u, steps[:, None] * self._colouring.seeds))
+        return product @ sp.diags_array(1.0 / steps)
+
+    def estimated_terms(self, u: Array, sizes: Array) -> Array | None:
+        """(Σ_j (J_ij d_j)²)^½, (U,), as the root mean square of J D z over random signs z."""
+        signs = np.where(np.random.default_rng(0).random((len(u), PROBES)) < 0.5, -1.0, 1.0)
+        directions = sizes[:, None] * signs
+        try:
+            products = self.derivative(u, directions)
+        except (SolveError, NoSeries):
+            products = self._differences(u, directions)
+        return np.sqrt((products**2).mean(axis=1))
+
+    def _differences(self, u: Array, directions: Array) -> Array:
+        """J(u) W for directions W, both (U, C), by differences of F."""
+        before = self.residual(u)
+        return np.stack([(self.residual(u + STEP * w) - before) / STEP for w in directions.T], axis=1)
 
     def expand(self, u: Array) -> Expansion:
         """The formula run on a series that begins with u. Raises SolveError (not applicable) when F does not

@@ -67,6 +67,10 @@ class System(Scene, ABC):
         """Where the Jacobian may differ from zero, a sparse (U, U) matrix; None: anywhere."""
         return None
 
+    def typical_sizes(self) -> Array | None:
+        """Sizes, (U,), beside which an unknown that is small counts as zero; None: as it began, and as it is."""
+        return None
+
     def roots(self) -> Array | None:
         """Known roots, shape (K, U), accurate to a relative 1e-12; None when none is known."""
         return None
@@ -82,14 +86,26 @@ class System(Scene, ABC):
         return False
 
     def nearest_root(self, u: Array) -> Array | None:
-        """The known root, shape (U,), that is nearest to u (U,); None when none is known."""
+        """The known root, shape (U,), that is nearest to u (U,), each unknown beside the largest it is at u and at a
+        root; None when none is known.
+        """
         roots = self.roots()
-        return None if roots is None else roots[np.linalg.norm(roots - u, axis=1).argmin()]
+        if roots is None:
+            return None
+        sizes = np.fmax(np.abs(u), np.abs(roots).max(axis=0, initial=0.0))
+        return roots[np.linalg.norm((roots - u) / np.where(sizes > 0.0, sizes, 1.0), axis=1).argmin()]
 
     def equations(self) -> FormulaProblem:
         """The problem F(u) = 0, with its Jacobian by groups of columns and its expansion."""
         size = len(self.standard_start())
-        return FormulaProblem(self.formula, size, self.pattern(), columns=True, is_gradient=self.is_gradient)
+        return FormulaProblem(
+            self.formula,
+            size,
+            self.pattern(),
+            columns=True,
+            is_gradient=self.is_gradient,
+            typical_sizes=self.typical_sizes(),
+        )
 
     def search(self, start: Array, linear: LinearSolver, entry: Entry) -> RootSearch:
         """The simulation from any `start` (U,); `entry` times the building of the problem."""

@@ -22,7 +22,8 @@ class Outcome:
     status : the kind of ending.
     detail : a sentence on this ending; the sentence of the status when there is no more to say.
     state : u, shape (U,), the last state that the method reached.
-    residual_norm : ‖R(u)‖₂ over the problem's scale, which the driver computes.
+    residual_norm : the relative residual, which the driver computes: ‖R(u)‖₂ over the problem's scale, or |F_i| over
+        what cancels in equation i, largest over the equations (`nlsolve.algebra.measure`).
     residual_absolute : ‖R(u)‖₂ in the unit of the problem; NaN when nothing was solved.
     rows : one dictionary for each step, in order; `steps` gives them as a frame.
     claimed_wrongly : True when the method, or a stopping test other than that of residuals, accepted a state whose
@@ -32,6 +33,7 @@ class Outcome:
     counts : how often each kind of work was done in this solve, by columns of `runs`.
     seconds : the time [s] that each kind of work took, "own" for the method's own arithmetic; their sum is the time
         spent in the method.
+    newton_correction : max_j |Δu_j| over the size of u_j, where the driver has needed it to judge the state; else NaN.
     """
 
     status: Status
@@ -45,6 +47,7 @@ class Outcome:
     counts: Mapping[str, int] = field(default_factory=dict)
     seconds: Mapping[str, float] = field(default_factory=dict)
     residual_absolute: float = float("nan")
+    newton_correction: float = float("nan")
 
     @property
     def converged(self) -> bool:

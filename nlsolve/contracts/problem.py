@@ -11,6 +11,28 @@ import numpy as np
 from nlsolve.contracts.status import SolveError, Status
 from nlsolve.series import Array, Series
 
+SAFE = 1e-150, 1e150
+"""Between these a sum of squares neither overflows nor loses digits to underflow."""
+
+
+def norm(vector: Array) -> float:
+    """‖x‖₂ of x (N,), finite up to the largest float."""
+    size = float(np.linalg.norm(vector))
+    if SAFE[0] < size < SAFE[1] or np.isnan(size):
+        return size
+    largest = float(np.abs(vector).max(initial=0.0))
+    if largest == 0.0 or not np.isfinite(largest):
+        return largest
+    return largest * float(np.linalg.norm(vector / largest))
+
+
+def unit(vector: Array) -> float:
+    """A power of two near the largest |x_i| of x (N,): to divide by it rounds nothing, and squares neither overflow
+    nor underflow. 1 for zero, and where x is not finite.
+    """
+    largest = float(np.abs(vector).max(initial=0.0))
+    return float(np.ldexp(0.5, np.frexp(largest)[1])) if 0.0 < largest < np.inf else 1.0
+
 
 class Expansion:
     """R(u(a)) = Σ_j a^j R_j along u(a) = u_0 + a u_1 + … : coefficients of the residual, one order at a time.
@@ -53,6 +75,13 @@ class NonlinearProblem(ABC):
     """False when `operator` gives another matrix than `jacobian`."""
     is_gradient: bool = False
     """True when R is the gradient of a convex potential, so that R(u + t w)·w grows with t for every direction w."""
+    typical_sizes: Array | None = None
+    """Sizes, (U,), at which the unknowns count as large: what is small beside them is zero. None: not known."""
+
+    @property
+    def has_scale(self) -> bool:
+        """True when the problem knows the size of what cancels in R; by default, when its class defines `scale`."""
+        return type(self).scale is not NonlinearProblem.scale
 
     @property
     def has_series(self) -> bool:
@@ -127,5 +156,29 @@ class NonlinearProblem(ABC):
         return {"blame_unknown": int(np.nan_to_num(np.abs(residual), nan=np.inf).argmax())}
 
     def scale(self, u: Array) -> float:
-        """The size that ‖R(u)‖₂ is divided by to judge it; 1 unless the problem knows the size of what cancels in R."""
+        """The size that ‖R(u)‖₂ is divided by to judge it, for a problem that knows the size of what cancels in R.
+
+        A problem that does not define it is judged equation by equation, by its Jacobian (`nlsolve.algebra.measure`).
+        """
         return 1.0
+
+    def size(self, residual: Array) -> float:
+        """‖R‖₂ of R (U,) in the units of `weighted`."""
+        return norm(self.weighted(residual))
+
+    def weighted(self, residual: Array) -> Array:
+        """R (U,) in units that do not depend on those of its equations: in a solve of a problem without a scale the
+        driver divides each F_i by the size of what cancels in it, the largest one so far. Else R itself.
+        """
+        return residual
+
+    def linearisation(self, u: Array, sizes: Array) -> Any:
+        """J(u), or what comes near it, by which a state is judged, outside of methods; None where that costs too much.
+
+        sizes : of the unknowns, (U,). Raises SolveError when there is none.
+        """
+        return self.jacobian(u)
+
+    def estimated_terms(self, u: Array, sizes: Array) -> Array | None:
+        """About Σ_j |J_ij| d_j for `sizes` d, (U,), where `linearisation` gives nothing; None: not known."""
+        return None

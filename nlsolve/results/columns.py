@@ -161,8 +161,15 @@ RUNS = _by_name(
     Column("condition", "estimate of ‖K*‖₁ ‖K*⁻¹‖₁ for the last tangent, where the linear solver can tell"),
     Column(
         "residual_norm",
-        "largest relative residual accepted in any increment, evaluated outside the method",
+        "largest relative residual accepted in any increment, evaluated outside the method; of a system |F_i| over the "
+        "size of what cancels in equation i, largest over the equations",
         symbol="relative residual",
+    ),
+    Column(
+        "newton_correction",
+        "of a problem without a scale of its own: max_j |Δu_j| over the size of u_j, Δu the Newton correction at the "
+        "end, evaluated outside the method; NaN where the residual alone told that it is not solved",
+        symbol="Newton correction",
     ),
     Column(
         "residual_absolute",
@@ -195,7 +202,8 @@ RUNS = _by_name(
     ),
     Column(
         "root_error",
-        "‖u − root‖/‖root‖ for the known root nearest to where a system ended (‖u‖ for the root 0)",
+        "max_j |u_j − root_j|/|root_j| for the known root nearest to where a system ended; where root_j = 0, over the "
+        "size that the unknown began with",
         relative_error=True,
     ),
     Column(

@@ -25,8 +25,8 @@ RIGHT, DOUBTED, WRONG = "right", "doubted", "wrong"
 AT_A_SOLUTION = frozenset({Status.CONVERGED, Status.OTHER_ROOT})
 """Statuses of runs that met their stopping test."""
 
-BY_RESIDUAL = "residual"
-"""The kind of stopping test whose tolerance is a relative residual."""
+BY_RESIDUALS = frozenset({"residual", "absolute"})
+"""The kinds of stopping test that ask for the residual, so that a state which has met them is solved."""
 
 Run = Mapping[str, Any]
 """A row of `runs`, by the names of its columns."""
@@ -55,13 +55,13 @@ def outcome(run: Run, accepted: float = ACCEPTED, error: str = "velocity_error")
 def solved(run: Run, accepted: float = ACCEPTED, error: str = "velocity_error") -> bool:
     """At a solution, by a small enough residual evaluated outside the method, with an error ≤ accepted.
 
-    Small enough is the tolerance of a stopping test on the residual; after a difference or a claim it is `VERIFIED`.
+    Small enough is what meets a stopping test on the residual; after a difference or a claim it is `VERIFIED`.
     A doubt takes nothing from a small error; an error nobody knows must be beyond doubt. A root that is not among the
     known ones is a root.
     """
     status = status_of(run)
-    limit = number(run.get("stop.tolerance")) if run.get("stop.kind") == BY_RESIDUAL else VERIFIED
-    if status not in AT_A_SOLUTION or not number(run.get("residual_norm")) <= limit:
+    by_residual = run.get("stop.kind") in BY_RESIDUALS
+    if status not in AT_A_SOLUTION or not (by_residual or number(run.get("residual_norm")) <= VERIFIED):
         return False
     known = number(run.get(error))
     return status is Status.OTHER_ROOT or (not doubt(run) if np.isnan(known) else known <= accepted)

@@ -61,15 +61,17 @@ def mistake(caller: str, place: str, value: object, expected: str) -> InputError
     return InputError(Problem((place,), value, expected).sentence(Source(caller)))
 
 
-def posed_problem(caller: str, problem: Any, start: Any, pattern: Any, jacobian: Any) -> Posed:
+def posed_problem(
+    caller: str, problem: Any, start: Any, pattern: Any, jacobian: Any, typical_sizes: Any = None
+) -> Posed:
     """The checked problem and start. Raises InputError if one of them cannot be used or they do not fit together."""
     if isinstance(problem, type):
         raise mistake(caller, "problem", problem, f"is a class: give an instance of it, such as {problem.__name__}(…)")
     if not isinstance(problem, System | NonlinearProblem):
         if not callable(problem):
             raise mistake(caller, "problem", problem, "should be a function F(u), a System or a NonlinearProblem")
-        return _of_formula(caller, problem, _start(caller, start), pattern, jacobian)
-    for name, given in (("pattern", pattern), ("jacobian", jacobian)):
+        return _of_formula(caller, problem, _start(caller, start), pattern, jacobian, typical_sizes)
+    for name, given in (("pattern", pattern), ("jacobian", jacobian), ("typical_sizes", typical_sizes)):
         if given is not None:
             raise mistake(caller, name, given, f"is for a function F(u); a {type(problem).__name__} has its own")
     if isinstance(problem, System):
@@ -114,7 +116,21 @@ def _check_residual(caller: str, residual: Formula, start: Array) -> None:
         raise InputError(f"{caller}: problem: {error}") from error
 
 
-def _of_formula(caller: str, formula: Formula, start: Array, pattern: Any, jacobian: Any) -> Posed:
+def _sizes(caller: str, given: Any, start: Array) -> Array | None:
+    """The typical sizes, (U,). Raises InputError unless they are finite numbers, none of them negative."""
+    if given is None:
+        return None
+    try:
+        sizes = real(given if np.ndim(given) else np.full(len(start), given), start.shape, "typical_sizes")
+    except InputError as error:
+        raise InputError(f"{caller}: {error}") from error
+    if not (np.isfinite(sizes) & (sizes >= 0.0)).all():
+        raise mistake(caller, "typical_sizes", given, "should be finite numbers, none of them negative")
+    return sizes
+
+
+def _of_formula(caller: str, formula: Formula, start: Array, pattern: Any, jacobian: Any, typical: Any) -> Posed:
+    sizes = _sizes(caller, typical, start)
     _check_residual(caller, formula, start)
     if jacobian is not None and not callable(jacobian):
         raise mistake(caller, "jacobian", jacobian, "should be a function of u that returns the (U, U) matrix J(u)")
@@ -122,7 +138,7 @@ def _of_formula(caller: str, formula: Formula, start: Array, pattern: Any, jacob
     if pattern is not None and np.shape(pattern) != (size, size):
         expected = f"has shape {np.shape(pattern)}: should be a matrix of shape {(size, size)}"
         raise mistake(caller, "pattern", pattern, expected)
-    problem = FormulaProblem(formula, size, pattern, jacobian)
+    problem = FormulaProblem(formula, size, pattern, jacobian, typical_sizes=sizes)
     if pattern is not None and jacobian is None:
         _check_pattern(caller, problem, FormulaProblem(formula, size), start)
     return Posed(problem, start)

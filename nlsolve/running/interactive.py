@@ -35,6 +35,7 @@ def solve(
     budget: Mapping[str, Any] | Budget | None = None,
     pattern: Any | None = None,
     jacobian: Formula | None = None,
+    typical_sizes: ArrayLike | None = None,
 ) -> Outcome:
     """Solve F(u) = 0 from `start`.
 
@@ -48,10 +49,12 @@ def solve(
     pattern : for a function: sparse (U, U), with an entry wherever J(u) may differ from zero; J(u) then costs a few
         columns instead of U.
     jacobian : for a function that is not analytic: u -> J(u), dense or sparse (U, U).
+    typical_sizes : for a function: sizes (U,) beside which an unknown that is small counts as zero; without them the
+        size it began with.
 
     The `Outcome` says how the solve ended, a failure too. Raises InputError for arguments that cannot be used.
     """
-    posed = posed_problem("nlsolve.solve", problem, start, pattern, jacobian)
+    posed = posed_problem("nlsolve.solve", problem, start, pattern, jacobian, typical_sizes)
     return _solved(posed, strategy_of("nlsolve.solve", solver, linear, refresh, operator, stop, budget)).outcome
 
 
@@ -67,6 +70,7 @@ def compare(
     budget: Mapping[str, Any] | Budget | None = None,
     pattern: Any | None = None,
     jacobian: Formula | None = None,
+    typical_sizes: ArrayLike | None = None,
 ) -> pd.DataFrame:
     """Solve one problem from one start with each of `solvers`: one row for each, with the columns of `runs` that apply.
 
@@ -77,7 +81,7 @@ def compare(
     InputError for arguments that cannot be used.
     """
     caller = "nlsolve.compare"
-    posed = posed_problem(caller, problem, start, pattern, jacobian)
+    posed = posed_problem(caller, problem, start, pattern, jacobian, typical_sizes)
     if isinstance(solvers, str | Component) or not solvers or (isinstance(solvers, Mapping) and "kind" in solvers):
         raise mistake(caller, "solvers", solvers, 'should be a list or a dictionary of them, such as ["newton", "anm"]')
     named = solvers if isinstance(solvers, Mapping) else None

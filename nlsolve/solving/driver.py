@@ -3,24 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import partial
 from typing import Any
 
 import numpy as np
 
+from nlsolve.algebra.measure import measure_of
 from nlsolve.contracts.nonlinear_solver import NonlinearSolver
 from nlsolve.contracts.outcome import Outcome
-from nlsolve.contracts.problem import NonlinearProblem
+from nlsolve.contracts.problem import NonlinearProblem, norm
 from nlsolve.contracts.status import CaseStopped, SolveError, Status
 from nlsolve.results.columns import step_columns
-from nlsolve.series import Array, NoSeries
+from nlsolve.series import Array
 from nlsolve.solving.stopping import Budget, StoppingTest
 from nlsolve.solving.tangent import Tangent
-from nlsolve.solving.work.counted_matrix import plain
 from nlsolve.solving.work.counted_problem import CountedProblem
 from nlsolve.solving.work.ledger import Ledger
 
 GROWTH_OF_DIVERGENCE = 1e6  # residual over the larger of its first value and its scale
-ROUNDING = 4.0 * float(np.finfo(float).eps)  # of ‖R‖ over the size of the terms of J u, where R counts as zero
 PATIENCE = 40  # steps without a new smallest residual after which a method has stagnated
 
 
@@ -42,7 +42,8 @@ def solve(
     """
     counted = CountedProblem(problem, ledger, tangent.operator)
     begun, renewals, withheld = ledger.copy(), tangent.renewals, tangent.withheld
-    scale = counted.uncounted_scale(start)
+    measure = measure_of(problem, start, counted.first_residual(start), tangent.linear)
+    counted.judged_by(measure, start)
     before, rows = start, list[dict[str, Any]]()
     residual_norm = size = np.inf
     claimed = denied = False
@@ -66,10 +67,17 @@ def solve(
             blame,
             {"tangents": tangent.renewals - renewals, **spent.counted()},
             spent.timed(),
-            float(size),
+            rows[-1]["residual_absolute"] if rows else np.inf,
+            measure.correction,
         )
 
-    if not np.isfinite(scale):
+    def is_solved(state: Array) -> bool:
+        residual = counted.uncounted_residual(state)
+        if stop.kind == "absolute":
+            return stop.size(residual) <= stop.tolerance
+        return measure.settled(state, residual, float(residual_norm), stop.verified)
+
+    if not np.isfinite(measure.scale):
         why = problem.undefined(start) or "the law gave no finite viscosity"
         return ended(Status.NON_FINITE, f"the forces at the first state are not finite: {why}")
     if tangent.operator is not None and not solver.uses_operator:
@@ -87,16 +95,18 @@ def solve(
                 step = next(iterator, None)
         except SolveError as error:
             lost = error.status is Status.SINGULAR_TANGENT
-            if stop.kind != "residual" and (size == 0.0 or (lost and vanishes(problem, before, size))):
+            residual = counted.uncounted_residual(before)
+            if not stop.is_of_residuals and (size == 0.0 or (lost and measure.vanishes(before, residual))):
                 return ended(Status.CONVERGED, "R = 0, and the method has no further step to compare or to claim")
-            denied |= residual_norm <= stop.verified
+            denied |= bool(rows) and is_solved(before)
             return ended(error.status, error.detail)
         except CaseStopped as limit:
             return ended(limit.status, limit.detail)
         if step is None:
             return ended(Status.STAGNATED, "the method stopped by itself before the stopping test was met")
-        size_before, size = size, float(np.linalg.norm(counted.uncounted_residual(step.state)))
-        residual_norm = size / scale
+        residual = counted.uncounted_residual(step.state)
+        size_before, size = size, measure.size(residual)
+        residual_norm, progress = measure.relative(step.state, residual), size / measure.scale
         contraction = (size / size_before if size_before else 0.0) if number else None
         tangent.step_taken(contraction)
         difference = stop.difference(step.state, before) if number else np.nan
@@ -106,37 +116,31 @@ def solve(
             "tangents": tangent.renewals,
             "triangular_solves": ledger.counts["triangular_solve"],
             "residual_norm": residual_norm,
-            "residual_absolute": size,
+            "residual_absolute": norm(residual),
             "difference": difference,
             "seconds": ledger.seconds["method"],
         }
         contraction_column = {"contraction": np.nan if contraction is None else contraction}
         rows.append(measured | contraction_column | step_columns(step.notes) | measured)
-        solved = residual_norm <= stop.verified
+        solved = step.claim is not None and is_solved(step.state)
         claimed |= step.claim is True and not solved
         denied |= step.claim is False and solved
         if not np.isfinite(residual_norm):
             if not np.isfinite(step.state).all():
                 return ended(Status.NON_FINITE)
             return ended(Status.OUT_OF_DOMAIN, problem.undefined(step.state))
-        if stop.met(step, residual_norm, difference):
-            claimed |= not solved  # a test of differences accepts a state without its residual
+        if stop.met(step, partial(is_solved, step.state), difference):
+            if not stop.is_of_residuals:  # accepts a state without its residual
+                claimed |= not is_solved(step.state)
+            if stop.kind == "absolute":
+                measure.settled(step.state, residual, residual_norm, np.inf)  # for the correction that is reported
             return ended(Status.CONVERGED)
         if number == 0:
-            first = residual_norm
-        if residual_norm > GROWTH_OF_DIVERGENCE * max(1.0, first):
+            first = progress
+        if progress > GROWTH_OF_DIVERGENCE * max(1.0, first):
             return ended(Status.DIVERGED)
-        since_best = 0 if residual_norm < best else since_best + 1
-        best = min(best, residual_norm)
+        since_best = 0 if progress < best else since_best + 1
+        best = min(best, progress)
         if since_best >= PATIENCE:
             return ended(Status.STAGNATED)
     return ended(Status.BUDGET_SPENT)
-
-
-def vanishes(problem: NonlinearProblem, state: Array, size: float) -> bool:
-    """Whether R(u) is no more than the rounding in terms of the size of |J| |u| that cancel; `size` is ‖R(u)‖₂."""
-    try:
-        terms = abs(plain(problem.jacobian(state))) @ np.abs(state)
-    except (SolveError, NoSeries):
-        return False
-    return bool(size <= ROUNDING * float(np.linalg.norm(terms)))

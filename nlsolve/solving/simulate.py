@@ -174,7 +174,7 @@ class _Run:
         self.increments = self.iterations = 0
         self.time = 0.0
         self.validity_time: float | None = None
-        self.residual_norm = self.residual_absolute = float("nan")
+        self.residual_norm = self.residual_absolute = self.newton_correction = float("nan")
         self.false_convergence = self.false_failure = 0
         self.blame: Mapping[str, float] = {}
         self.kept: tuple[NonlinearProblem, Array] | None = None
@@ -228,6 +228,7 @@ class _Run:
             self.residual_norm = self.residual_absolute = np.nan
         self.residual_norm = float(np.fmax(self.residual_norm, outcome.residual_norm))
         self.residual_absolute = float(np.fmax(self.residual_absolute, outcome.residual_absolute))
+        self.newton_correction = float(np.fmax(self.newton_correction, outcome.newton_correction))
         if outcome.status is Status.CONVERGED:
             self.increments, self.time = max(k, 1), task.time
             self.rows[-1] |= {"accepted": True, **self.keep(task, outcome)}
@@ -281,6 +282,7 @@ class _Run:
             **self.tangent.facts(),
             "residual_norm": self.residual_norm,
             "residual_absolute": self.residual_absolute,
+            **({} if np.isnan(self.newton_correction) else {"newton_correction": self.newton_correction}),
             **run_columns({**self.simulation.sizes, **self.simulation.measured(outcome)}),
         }
 

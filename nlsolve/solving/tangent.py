@@ -27,6 +27,7 @@ class Tangent(KeptTangent):
 
     rule : when K* is renewed; None: at every iteration.
     pattern : factors of a matrix with a similar pattern, whose ordering may be used again.
+    linear : the linear solver of the case.
     operator : what K* is made of, where that is not the tangent.
     renewals : how often K* has been renewed.
     withheld : how often the rule has asked for a new K* when the operator had no other.
@@ -40,7 +41,7 @@ class Tangent(KeptTangent):
         pattern: Factors | None = None,
         operator: CheckedOperator | None = None,
     ) -> None:
-        self._linear, self._rule, self._ledger, self._pattern = linear, rule, ledger, pattern
+        self.linear, self._rule, self._ledger, self._pattern = linear, rule, ledger, pattern
         self.operator = operator
         self._matrix: CountedMatrix | None = None
         self.factors: Factors | None = None
@@ -66,7 +67,7 @@ class Tangent(KeptTangent):
     def _factorized(self, matrix: CountedMatrix) -> Factors:
         try:
             with self._ledger.entry("factorization"):
-                factors = self._linear.factorize(plain(matrix), self.factors or self._pattern)
+                factors = self.linear.factorize(plain(matrix), self.factors or self._pattern)
         except SolveError as error:
             why = error.detail
             if error.status is Status.SINGULAR_TANGENT and self.operator is None:
@@ -89,7 +90,7 @@ class Tangent(KeptTangent):
         if not np.isfinite(rhs).all():
             raise SolveError(Status.NON_FINITE, "a right-hand side for the tangent was not finite")
         x = self._solved(self.factors, rhs)
-        for _ in range(self._linear.refinement):
+        for _ in range(self.linear.refinement):
             x = x + self._solved(self.factors, rhs - self._matrix @ x)
         self.history = replace(self.history, solves=self.history.solves + 1)
         if not np.isfinite(x).all():

@@ -9,11 +9,17 @@ from typing import Literal
 import numpy as np
 from pydantic import Field
 
-from nlsolve.plugin import Globalization, NonlinearProblem, Search
+from nlsolve.plugin import Globalization, NonlinearProblem, Search, norm
 
 SUFFICIENT_DECREASE = 1e-4  # of ‖R‖, as part of the decrease predicted per unit of step length (Armijo 1966)
 OVER = 1e30  # larger ratios of residuals are set to this, so that their fourth power stays finite
 SHORTEST, LONGEST = 0.1, 0.5  # the next length over the last one (Dennis & Schnabel 1983, A6.3.1)
+
+ComparedBy = Literal["euclidean", "equations"]
+COMPARED_BY = (
+    "how residuals are compared: by ‖R‖₂, or by each equation over the largest terms that it has had, which no unit "
+    "changes (the same for a flow)"
+)
 
 Trials = list[tuple[float, float]]
 """Lengths t tried so far and the ‖R(u + t w)‖/‖R(u)‖ found there."""
@@ -24,10 +30,11 @@ class Backtracking(Globalization):
 
     kind: Literal["backtracking"] = "backtracking"
     trials: int = Field(10, gt=0, description="lengths t that may be tried besides the full step")
+    measure: ComparedBy = Field("euclidean", description=COMPARED_BY)
 
     def search(self, problem: NonlinearProblem) -> Search:
         """The search of one solve; a step is compared with the last residual alone."""
-        return LeastResidual(self.trials, 1, halved)
+        return LeastResidual(self.trials, 1, halved, self.measure)
 
 
 class NonMonotone(Backtracking):
@@ -38,7 +45,7 @@ class NonMonotone(Backtracking):
 
     def search(self, problem: NonlinearProblem) -> Search:
         """The search of one solve; a step is compared with the largest of the last m residuals."""
-        return LeastResidual(self.trials, self.memory, halved)
+        return LeastResidual(self.trials, self.memory, halved, self.measure)
 
 
 class Cubic(Backtracking):
@@ -48,14 +55,16 @@ class Cubic(Backtracking):
 
     def search(self, problem: NonlinearProblem) -> Search:
         """The search of one solve; a step is compared with the last residual alone."""
-        return LeastResidual(self.trials, 1, interpolated)
+        return LeastResidual(self.trials, 1, interpolated, self.measure)
 
 
 class LeastResidual:
     """The search of these three; they differ in how many residuals a step is compared with, and in the next t."""
 
-    def __init__(self, trials: int, memory: int, shorter: Callable[[Trials, float], float]) -> None:
-        self._trials, self._shorter = trials, shorter
+    def __init__(
+        self, trials: int, memory: int, shorter: Callable[[Trials, float], float], measure: ComparedBy = "euclidean"
+    ) -> None:
+        self._trials, self._shorter, self._measure = trials, shorter, measure
         self._sizes: deque[float] = deque(maxlen=memory)
 
     def length(
@@ -67,13 +76,13 @@ class LeastResidual:
         predicted_decrease: float = 1.0,
     ) -> tuple[float, np.ndarray]:
         """The first t with enough decrease, else the best of those tried; and R(u + t w), (U,)."""
-        size = float(np.linalg.norm(residual))
+        size = self._size(problem, residual)
         self._sizes.append(size)
         length, best_length, best_size, best = 1.0, 1.0, np.inf, residual
         tried: Trials = []
         for _ in range(self._trials + 1):
             trial = problem.residual(state + length * direction)
-            trial_size = float(np.linalg.norm(trial))
+            trial_size = self._size(problem, trial)
             if trial_size < best_size or not np.isfinite(best_size):
                 best_length, best_size, best = length, trial_size, trial
             if not size or trial_size <= (1.0 - SUFFICIENT_DECREASE * length * predicted_decrease) * max(self._sizes):
@@ -81,6 +90,9 @@ class LeastResidual:
             tried.append((length, min(trial_size / size, OVER)))
             length = self._shorter(tried, predicted_decrease)
         return best_length, best
+
+    def _size(self, problem: NonlinearProblem, residual: np.ndarray) -> float:
+        return problem.size(residual) if self._measure == "equations" else norm(residual)
 
 
 def halved(tried: Trials, predicted_decrease: float) -> float:

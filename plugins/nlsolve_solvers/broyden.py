@@ -8,7 +8,7 @@ from typing import ClassVar, Literal
 import numpy as np
 from pydantic import Field
 
-from nlsolve.plugin import Globalized, KeptTangent, NonlinearProblem, NonlinearSolver, Step
+from nlsolve.plugin import Globalized, KeptTangent, NonlinearProblem, NonlinearSolver, Step, unit
 
 LONGEST = 0.9  # 1 − (sᵀs + sᵀv)/sᵀs: beyond it the next full step would be more than ten times z
 
@@ -71,8 +71,10 @@ class Updates:
             z = z + c * (s @ z)
         if self._last is None:
             return z
-        s, length = self._last
-        v = (1.0 / length - 1.0) * s - z
+        step, length = self._last
+        v = (1.0 / length - 1.0) * step - z
+        s = step / unit(step)  # a power of two, which keeps squares finite and rounds nothing
+        v = v / unit(step)
         square = float(s @ s)
         left = square + float(s @ v)
         if not left > (1.0 - LONGEST) * square:

@@ -8,9 +8,9 @@ from typing import Any, Literal
 import numpy as np
 import scipy.sparse as sp
 from pydantic import Field
-from scipy.sparse.linalg import norm
+from scipy.sparse.linalg import norm as sparse_norm
 
-from nlsolve.plugin import KeptTangent, NonlinearProblem, NonlinearSolver, SolveError, Status, Step
+from nlsolve.plugin import KeptTangent, NonlinearProblem, NonlinearSolver, SolveError, Status, Step, norm, unit
 
 ACCEPTED = 1e-4  # gain over the one predicted from which a step is taken
 LARGEST_SHIFT = 1e12  # μ: shorter steps are lost in the rounding of u
@@ -38,7 +38,7 @@ class LevenbergMarquardt(NonlinearSolver):
         residual = problem.residual(state)
         yield Step(state)
         while True:
-            size = float(np.linalg.norm(residual))
+            size = norm(residual)
             renewed = tangent.refresh_if_due(lambda: augmented(problem.jacobian(state), shift))
             if refused and (shift > LARGEST_SHIFT or not renewed):
                 why = f"with a damping of {shift:.1e}" if renewed else "and the refresh rule keeps its matrix"
@@ -48,8 +48,10 @@ class LevenbergMarquardt(NonlinearSolver):
             both = tangent.solve(np.concatenate([-residual, np.zeros_like(state)]))
             left, step = np.split(both, 2)
             trial = problem.residual(state + step)
-            trial_size, predicted = float(np.linalg.norm(trial)), size**2 - float(left @ left)
-            gain = (size**2 - trial_size**2) / predicted if predicted > 0.0 else float(size == 0.0)
+            trial_size, scale = norm(trial), unit(residual)  # a power of two, which keeps squares finite
+            predicted = (size / scale) ** 2 - float((left / scale) @ (left / scale))
+            fallen = (size / scale) ** 2 - (trial_size / scale) ** 2
+            gain = fallen / predicted if predicted > 0.0 else float(size == 0.0)
             refused = not gain > ACCEPTED
             if refused:
                 tangent.observe(contraction=max(trial_size / size, 1.0))
@@ -69,15 +71,22 @@ def augmented(jacobian: Any, shift: float) -> Any:
     zeros, by which w cannot be told, ‖J e_j‖ is the largest there is, or 1: its w_j is zero.
     """
     matrix = jacobian.tocsr()
-    columns = norm(matrix, axis=0)
+    columns = lengths_of_columns(matrix)
     columns = np.where(columns > 0.0, columns, columns.max() or 1.0)
     alpha = float(columns.min())
-    rows = [[sp.eye_array(matrix.shape[0]), matrix], [matrix.T / alpha, -sp.diags_array(shift * columns**2 / alpha)]]
+    damping = shift * columns * (columns / alpha)
+    rows = [[sp.eye_array(matrix.shape[0]), matrix], [matrix.T / alpha, -sp.diags_array(damping)]]
     return sp.block_array(rows, format="csr")
+
+
+def lengths_of_columns(matrix: Any) -> np.ndarray:
+    """‖J e_j‖, (U,), of a sparse matrix (U, U)."""
+    scale = unit(matrix.data)
+    return scale * sparse_norm(matrix / scale, axis=0)
 
 
 def is_stationary(jacobian: Any, residual: np.ndarray) -> bool:
     """Whether the gradient Jᵀ R of ½ ‖R‖² vanishes beside ‖J‖ ‖R‖."""
     matrix = jacobian.tocsr()
-    gradient = float(np.linalg.norm(matrix.T @ residual))
-    return gradient <= STATIONARY * float(norm(matrix)) * float(np.linalg.norm(residual))
+    gradient = norm(matrix.T @ (residual / unit(residual)))
+    return gradient <= STATIONARY * norm(matrix.data) * norm(residual / unit(residual))

@@ -9,7 +9,7 @@ import numpy as np
 import scipy.sparse as sp
 from pydantic import Field
 
-from nlsolve.plugin import KeptTangent, NonlinearProblem, NonlinearSolver, Step
+from nlsolve.plugin import KeptTangent, NonlinearProblem, NonlinearSolver, Step, norm
 
 
 class PseudoTransient(NonlinearSolver):
@@ -21,6 +21,11 @@ class PseudoTransient(NonlinearSolver):
 
     kind: Literal["pseudo-transient"] = "pseudo-transient"
     shift: float = Field(1.0, gt=0, description="σ of the first step; 1/σ is its length in time")
+    measure: Literal["euclidean", "equations"] = Field(
+        "euclidean",
+        description="how residuals are compared: by ‖R‖₂, or by each equation over the largest terms that it has had, "
+        "which no unit changes (the same for a flow)",
+    )
 
     def steps(self, problem: NonlinearProblem, tangent: KeptTangent, start: np.ndarray) -> Iterator[Step]:
         """The iterates u_0, u_1, …"""
@@ -35,12 +40,15 @@ class PseudoTransient(NonlinearSolver):
         residual = problem.residual(state)
         yield Step(state), residual
         while True:
-            size = float(np.linalg.norm(residual))
+            size = self._size(problem, residual)
             tangent.refresh_if_due(lambda: damped(problem.jacobian(state), shift))
             state = state - tangent.solve(residual)
             residual = problem.residual(state)
-            shift *= float(np.linalg.norm(residual)) / size if size else 0.0
+            shift *= self._size(problem, residual) / size if size else 0.0
             yield Step(state), residual
+
+    def _size(self, problem: NonlinearProblem, residual: np.ndarray) -> float:
+        return problem.size(residual) if self.measure == "equations" else norm(residual)
 
 
 def damped(jacobian: Any, shift: float) -> Any:

@@ -9,16 +9,16 @@ from typing import Any, Literal
 import numpy as np
 import scipy.sparse as sp
 from pydantic import Field
-from scipy.sparse.linalg import norm
 
-from nlsolve.plugin import KeptTangent, NonlinearProblem, NonlinearSolver, SolveError, Status, Step
+from nlsolve.plugin import KeptTangent, NonlinearProblem, NonlinearSolver, SolveError, Status, Step, norm
+from nlsolve_solvers.levenberg_marquardt import lengths_of_columns
 from nlsolve_solvers.newton import Newton
 from nlsolve_solvers.pseudo_transient import PseudoTransient
 
 FALL = 0.9  # largest part of ‖R‖ that may be left after `patience` steps
 FAR = 1e3  # largest growth of ‖R‖ that a leap may cause, or that Newton's steps may show before they are given up
 HALVINGS = 30  # of a leap's step; a shorter one moves nothing
-SINGULAR = 1e13  # ‖J‖ ‖J⁻¹ R‖/‖R‖ from which J counts as singular to working precision
+SINGULAR = 1e13  # ‖|J| |J⁻¹ R|‖/‖R‖ from which J counts as singular to working precision
 MOVES = (0.01, 0.1, 1.0)  # sizes of a random move away from such a state, over those of the unknowns
 SHORT = 10  # steps in which ‖R‖ must fall by a tenth once a tangent has been singular
 LEAST_NORM = 1e-8  # μ of a step of least norm: columns of J that are so much smaller than D take no part in it
@@ -50,7 +50,7 @@ class Robust(NonlinearSolver):
     def steps(self, problem: NonlinearProblem, tangent: KeptTangent, start: np.ndarray) -> Iterator[Step]:
         """The states of all methods tried, one after the other. Raises SolveError, as the last of them did."""
         yield Step(start)
-        reached = yield from self._descent(Newton(), problem, tangent, start, self.patience)
+        reached = yield from self._descent(newton(), problem, tangent, start, self.patience)
         stuck = reached.stuck
         for _ in range(self.leaps):
             try:
@@ -62,7 +62,7 @@ class Robust(NonlinearSolver):
             if landed is None:
                 break
             yield Step(landed)
-            reached = yield from self._descent(Newton(), problem, tangent, landed, self.patience)
+            reached = yield from self._descent(newton(), problem, tangent, landed, self.patience)
         failure = yield from self._relaxation(problem, tangent, start, stuck)
         yield from self._escape(problem, tangent, reached.state)
         tried = "tried: steps of least norm and random moves, from which ‖R‖ does not fall to zero either"
@@ -82,7 +82,7 @@ class Robust(NonlinearSolver):
         state, least, failure = start, list[float](), None
         try:
             for step, residual in method.steps_and_residuals(problem, tangent, start):
-                size = float(np.linalg.norm(residual))
+                size = problem.size(residual)
                 if not size <= FAR * min([size, *least[:1]]):
                     tangent.observe(contraction=FAR)  # this step is not yielded, so the driver cannot measure it
                     break
@@ -103,9 +103,9 @@ class Robust(NonlinearSolver):
         """Pseudo-transient continuation; returns how it failed, if that leaves something to try."""
         if stuck:
             yield Step(start)
-            return (yield from self._descent(PseudoTransient(), problem, tangent, start, SHORT)).failure
+            return (yield from self._descent(pseudo_transient(), problem, tangent, start, SHORT)).failure
         try:
-            yield from PseudoTransient().steps(problem, tangent, start)
+            yield from pseudo_transient().steps(problem, tangent, start)
         except SolveError as error:
             if error.status is not Status.SINGULAR_TANGENT:
                 raise
@@ -118,7 +118,17 @@ class Robust(NonlinearSolver):
             state = yield from least_norm_descent(problem, tangent, state)
             state = moved(problem, state, size, attempt)
             yield Step(state)
-            state = (yield from self._descent(Newton(), problem, tangent, state, SHORT)).state
+            state = (yield from self._descent(newton(), problem, tangent, state, SHORT)).state
+
+
+def newton() -> Newton:
+    """Newton's method with backtracking that no unit of an equation changes."""
+    return Newton(globalization={"kind": "backtracking", "measure": "equations"})
+
+
+def pseudo_transient() -> PseudoTransient:
+    """Pseudo-transient continuation with time steps that no unit of an equation changes."""
+    return PseudoTransient(measure="equations")
 
 
 @dataclass(frozen=True)
@@ -140,21 +150,22 @@ class Reached:
 
 def leap(problem: NonlinearProblem, tangent: KeptTangent, state: np.ndarray) -> tuple[np.ndarray | None, float]:
     """u − t K*⁻¹ R(u) with the largest t = 1, ½, … for which ‖R‖ is finite and at most `FAR` times what it was; None
-    if no t is found. Beside it ‖J‖ ‖J⁻¹ R‖/‖R‖, which is at most the condition of J; 0 where K* is an older tangent.
+    if no t is found. Beside it ‖|J| |J⁻¹ R|‖/‖R‖, which is at most the condition of J when its rows are made of one
+    size (Skeel 1979); 0 where K* is an older tangent.
 
     Raises SolveError if K* cannot be factorised.
     """
-    sizes = [0.0]
+    assembled: list[Any] = []
 
     def assemble() -> Any:
-        jacobian = problem.jacobian(state)
-        sizes.append(float(np.linalg.norm(jacobian.data)))
-        return jacobian
+        assembled.append(problem.jacobian(state))
+        return assembled[-1]
 
     tangent.refresh_if_due(assemble)
     residual = problem.residual(state)
-    direction, size = -tangent.solve(residual), float(np.linalg.norm(residual))
-    growth = sizes[-1] * float(np.linalg.norm(direction)) / size if size else 0.0
+    direction, size = -tangent.solve(residual), problem.size(residual)
+    terms = abs(assembled[-1].tocsr()) @ np.abs(direction) if assembled else np.zeros_like(residual)
+    growth = problem.size(terms) / size if size else 0.0
     return shortened(problem, state, direction, FAR * size), growth
 
 
@@ -162,7 +173,7 @@ def shortened(problem: NonlinearProblem, state: np.ndarray, direction: np.ndarra
     """u + t w with the largest t = 1, ½, … for which ‖R‖ is at most `highest`; None if no t is found."""
     for halving in range(HALVINGS + 1):
         landed = state + 0.5**halving * direction
-        if float(np.linalg.norm(problem.residual(landed))) <= highest:
+        if problem.size(problem.residual(landed)) <= highest:
             return landed
     return None
 
@@ -178,11 +189,13 @@ def least_norm_descent(
     try:
         while True:
             residual = problem.residual(state)
-            jacobian = problem.jacobian(state).tocsr()
-            columns = norm(jacobian, axis=0)
-            gradient = jacobian.T @ residual
-            size = float(np.linalg.norm(residual))
-            if not float(np.linalg.norm(gradient)) > LEAST_NORM * float(columns.max()) * size:
+            weights = sp.diags_array(problem.weighted(np.ones_like(residual)))
+            jacobian = sp.csr_array(weights @ problem.jacobian(state).tocsr())
+            columns = lengths_of_columns(jacobian)
+            gradient = jacobian.T @ (weights @ residual)
+            size = problem.size(residual)
+            along = np.divide(gradient, columns, out=np.zeros_like(gradient), where=columns > 0.0)
+            if not norm(along) > LEAST_NORM * size:
                 return state
             damping = LEAST_NORM * np.where(columns > 0.0, columns, columns.max()) ** 2
             normal = jacobian.T @ jacobian + sp.diags_array(damping)
@@ -203,5 +216,5 @@ def moved(problem: NonlinearProblem, state: np.ndarray, size: float, seed: int) 
     g = np.random.default_rng(seed).standard_normal(len(state))
     scale = np.where(state != 0.0, np.abs(state), np.abs(state).max() or 1.0)
     trials = [state + size * scale * direction for direction in (g, -g, np.abs(g), -np.abs(g))]
-    sizes = [float(np.linalg.norm(problem.residual(trial))) for trial in trials]
+    sizes = [problem.size(problem.residual(trial)) for trial in trials]
     return trials[int(np.nan_to_num(sizes, nan=np.inf).argmin())]

@@ -7,7 +7,17 @@ from typing import Any, ClassVar, Literal
 
 import numpy as np
 
-from nlsolve.plugin import KeptTangent, NonlinearProblem, NonlinearSolver, SolveError, Status, Step, cached_jacobian
+from nlsolve.plugin import (
+    KeptTangent,
+    NonlinearProblem,
+    NonlinearSolver,
+    SolveError,
+    Status,
+    Step,
+    cached_jacobian,
+    norm,
+    unit,
+)
 
 ACCEPTED = 1e-4  # decrease of ‖R‖ over the predicted one from which a step is taken
 POOR, GOOD = 0.25, 0.75  # the same ratio below which Δ is cut to a quarter of the step, above which it is doubled
@@ -32,11 +42,11 @@ class TrustRegion(NonlinearSolver):
         while True:
             tangent.refresh_if_due(lambda: jacobian.operator(state))
             chord = -tangent.solve(residual)
-            if float(np.linalg.norm(residual)) == 0.0:
+            if norm(residual) == 0.0:
                 yield Step(state)
                 continue
             if not np.isfinite(radius):
-                radius = float(np.linalg.norm(chord))
+                radius = norm(chord)
             step, residual, radius = self._accepted(problem, jacobian(state), state, residual, chord, radius)
             state = state + step
             yield Step(state)
@@ -51,15 +61,15 @@ class TrustRegion(NonlinearSolver):
         radius: float,
     ) -> tuple[np.ndarray, np.ndarray, float]:
         """The first dogleg step of shrinking regions that ‖R‖ falls for, the residual there, and the next Δ."""
-        size = float(np.linalg.norm(residual))
+        size = norm(residual)
         cauchy = cauchy_point(jacobian, residual)
-        smallest = SMALLEST * float(np.linalg.norm(state) + np.linalg.norm(chord))
+        smallest = SMALLEST * (norm(state) + norm(chord))
         while radius > smallest:
             step = dogleg(cauchy, chord, radius)
-            length = float(np.linalg.norm(step))
+            length = norm(step)
             trial = problem.residual(state + step)
-            predicted = size - float(np.linalg.norm(residual + jacobian @ step))
-            ratio = (size - float(np.linalg.norm(trial))) / predicted if predicted > 0.0 else -1.0
+            predicted = size - norm(residual + jacobian @ step)
+            ratio = (size - norm(trial)) / predicted if predicted > 0.0 else -1.0
             if not ratio >= POOR:
                 radius = POOR * length
             elif ratio > GOOD:
@@ -71,16 +81,24 @@ class TrustRegion(NonlinearSolver):
 
 def cauchy_point(jacobian: Any, residual: np.ndarray) -> np.ndarray:
     """−g ‖g‖²/‖J g‖² with g = Jᵀ R: where ‖R + J s‖ is least along the steepest descent."""
-    gradient = jacobian.T @ residual
+    size = unit(residual)  # powers of two, which keep squares finite and round nothing
+    gradient = jacobian.T @ (residual / size)
+    steep = unit(gradient)
+    gradient = gradient / steep
     along = jacobian @ gradient
-    return -gradient * (gradient @ gradient) / (along @ along)
+    far = unit(along)
+    along = along / far
+    return (-gradient * (gradient @ gradient) / (along @ along)) * (steep / far) * (size / far)
 
 
 def dogleg(cauchy: np.ndarray, chord: np.ndarray, radius: float) -> np.ndarray:
     """The point furthest along 0, `cauchy`, `chord` with ‖s‖ ≤ radius."""
-    if np.linalg.norm(chord) <= radius:
+    size = unit(chord)
+    if size != 1.0:
+        return size * dogleg(cauchy / size, chord / size, radius / size)
+    if norm(chord) <= radius:
         return chord
-    length = np.linalg.norm(cauchy)
+    length = norm(cauchy)
     if length >= radius:
         return cauchy * (radius / length)
     # |cauchy + t leg|² = Δ²

@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from nlsolve.contracts.problem import Expansion, NonlinearProblem
+from nlsolve.algebra.measure import Measure
+from nlsolve.contracts.problem import Expansion, NonlinearProblem, norm
 from nlsolve.contracts.status import SolveError, Status
 from nlsolve.series import Array, NoSeries, NoSeriesHere
 from nlsolve.solving.matrices import CheckedOperator
@@ -61,7 +62,7 @@ class CountedProblem(NonlinearProblem):
 
     operator : what K* is made of; None: J(u).
 
-    The driver judges the states of a method by `uncounted_residual` and `uncounted_scale`.
+    The driver judges the states of a method by `uncounted_residual` and by the `measure` of the solve.
     """
 
     def __init__(self, problem: NonlinearProblem, ledger: Ledger, operator: CheckedOperator | None = None) -> None:
@@ -69,12 +70,18 @@ class CountedProblem(NonlinearProblem):
         self.operator_is_jacobian = operator is None
         self._last: tuple[Array, Array] | None = None
         self._scales: dict[bytes, float] = {}
+        self.measure: Measure | None = None
         self.is_gradient = problem.is_gradient
 
     @property
     def has_series(self) -> bool:
         """See `NonlinearProblem`."""
         return self._problem.has_series
+
+    @property
+    def has_scale(self) -> bool:
+        """See `NonlinearProblem`."""
+        return self._problem.has_scale
 
     def residual(self, u: Array) -> Array:
         """R(u), (U,), counted as a residual."""
@@ -156,10 +163,21 @@ class CountedProblem(NonlinearProblem):
         with self._ledger.entry("residual"):
             return self._problem.scale(u)
 
-    def uncounted_scale(self, u: Array) -> float:
-        """The size that ‖R(u)‖ is divided by, not counted and not timed; `scale` gives it at no cost afterwards."""
-        scale = self._scales[u.tobytes()] = self._problem.scale(u)
-        return scale
+    def size(self, residual: Array) -> float:
+        """See `NonlinearProblem`; by the measure of the solve, at no cost."""
+        return norm(self.weighted(residual))
+
+    def weighted(self, residual: Array) -> Array:
+        """See `NonlinearProblem`."""
+        return residual if self.measure is None else self.measure.weighted(residual)
+
+    def first_residual(self, u: Array) -> Array:
+        """R(u) (U,) of a problem without a scale, not counted or timed; nothing is asked of one with a scale."""
+        return np.zeros_like(u) if self.has_scale else self._problem.residual(u)
+
+    def judged_by(self, measure: Measure, start: Array) -> None:
+        """Compare residuals by `measure` from now on; the scale at `start` (U,) is its own, at no cost."""
+        self.measure, self._scales[start.tobytes()] = measure, measure.absolute
 
     def uncounted_residual(self, u: Array) -> Array:
         """R(u), (U,), not counted and not timed; reused when the method has evaluated it last at the same state."""

@@ -9,7 +9,7 @@ import numpy as np
 import scipy
 from pydantic import Field
 
-from nlsolve.plugin import KeptTangent, NonlinearProblem, NonlinearSolver, SolveError, Status, Step
+from nlsolve.plugin import KeptTangent, NonlinearProblem, NonlinearSolver, SolveError, Status, Step, norm
 
 LEAST_GAIN = 0.1  # each run goes on until this part of the residual it began with is left
 MATRIX_IS_ONE = -1.0  # `alpha`: SciPy's methods begin with the Jacobian −1/α, and that of F is near 1
@@ -43,8 +43,8 @@ class ScipyRoot(NonlinearSolver):
         without preconditioning, where SciPy has ended; (non-finite) if a number of SciPy overflows.
         """
         state, known = start, [problem.residual(start)]
-        size = float(np.linalg.norm(known[0]))
-        goal = self.tolerance * problem.scale(start)
+        size = norm(known[0])
+        goal = self.tolerance * (problem.scale(start) if self.precondition or problem.has_scale else 1.0)
         if not (self.precondition or problem.operator_is_jacobian):
             raise SolveError(
                 Status.NOT_APPLICABLE,
@@ -53,7 +53,7 @@ class ScipyRoot(NonlinearSolver):
         yield Step(state)
         if not self.precondition:
             found, values = self._run(problem, None, state, known, goal)
-            contraction = (float(np.linalg.norm(found.fun)) / size) ** (1.0 / values) if size else 0.0
+            contraction = (norm(found.fun) / size) ** (1.0 / values) if size else 0.0
             yield Step(found.x, bool(found.success), {"contraction": contraction, **reported(found)})
             word = "reports success; lower its `tolerance`, or ask for less" if found.success else "ends here"
             said = " ".join(found.message.split()).rstrip(".")
@@ -63,7 +63,7 @@ class ScipyRoot(NonlinearSolver):
             found, values = self._run(problem, tangent, state, known, min(goal, LEAST_GAIN * size))
             state = state + tangent.solve(found.x)
             to_the_end = self.method == "hybr" or goal <= LEAST_GAIN * size
-            before, size = size, float(np.linalg.norm(found.fun))
+            before, size = size, norm(found.fun)
             contraction = (size / before) ** (1.0 / values) if before else 0.0
             tangent.observe(contraction=contraction)
             claim = True if found.success and to_the_end else None

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from nlsolve.plugin import KeptTangent, NonlinearProblem, SolveError, Status, Step, cached_jacobian
+from nlsolve.plugin import KeptTangent, NonlinearProblem, SolveError, Status, Step, cached_jacobian, norm
 
 LEAST_GAIN = 0.1  # each run goes on until this part of the residual it began with is left
 
@@ -48,7 +48,7 @@ class Served:
     def residual(self, u: np.ndarray) -> np.ndarray:
         """R(u)."""
         residual = self._problem.residual(u)
-        size = float(np.linalg.norm(residual))
+        size = norm(residual)
         if not self._sizes:
             self.goal = min(self.goal, LEAST_GAIN * size)
         self._sizes[u.tobytes()] = size
@@ -62,7 +62,7 @@ class Served:
     def size(self, u: np.ndarray) -> float:
         """‖R(u)‖₂, evaluated only where the library has not asked for R."""
         known = self._sizes.get(u.tobytes())
-        return float(np.linalg.norm(self.residual(u))) if known is None else known
+        return norm(self.residual(u)) if known is None else known
 
     def solved(self, u: np.ndarray) -> bool:
         """‖R(u)‖₂ ≤ goal."""

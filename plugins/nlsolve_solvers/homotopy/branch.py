@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from nlsolve.plugin import HomotopyForm, NonlinearProblem
+from nlsolve.plugin import HomotopyForm, NonlinearProblem, norm
 from nlsolve_solvers.homotopy.extrapolations import Extrapolation, coordinates, extrapolate, series
 from nlsolve_solvers.homotopy.forms import weighted
 
@@ -30,13 +30,13 @@ class Branch:
     @property
     def residual(self) -> float:
         """‖G(0)‖."""
-        return float(np.linalg.norm(self.rhs[0]))
+        return norm(self.rhs[0])
 
     @property
     def contraction(self) -> float:
         """(‖r_p‖/‖r_1‖)^(1/(p−1)): what an order leaves of the residual, in the mean; r_{j+1} is left by W_1 … W_j."""
         first = self.residual
-        return float((np.linalg.norm(self.rhs[-1]) / first) ** (1.0 / (self.order - 1))) if first else 0.0
+        return float((norm(self.rhs[-1]) / first) ** (1.0 / (self.order - 1))) if first else 0.0
 
     @property
     def singularity(self) -> float:
@@ -51,7 +51,7 @@ class Branch:
         """Push W_j and r_j = K* W_j."""
         self.rhs.append(rhs)
         self.terms.append(w_j)
-        self.sizes.append(float(np.linalg.norm(w_j)))
+        self.sizes.append(norm(w_j))
         self.recurrence.append(w_j)
         self._columns = None
 
@@ -89,7 +89,7 @@ class Branch:
         """‖what W(a) leaves in the homotopy at a‖, by evaluating G; at a = 1 that is ‖G(W(1))‖ in either form."""
         weights = self.extrapolation().weights(a)
         g = self.problem.residual(self.state + weighted(weights, self.terms))
-        return float(np.linalg.norm(g if a == 1.0 else self.recurrence.miss(a, g, weights, self.rhs)))
+        return norm(g if a == 1.0 else self.recurrence.miss(a, g, weights, self.rhs))
 
 
 class BranchView:

@@ -6,7 +6,7 @@ from typing import Literal
 
 import numpy as np
 
-from nlsolve.plugin import Range, RangeRule, SeriesBranch
+from nlsolve.plugin import Range, RangeRule, SeriesBranch, norm
 from nlsolve_solvers.homotopy.extrapolations import least_squares_pade
 
 TRIALS = 6  # residuals spent on finding the end of a range
@@ -51,7 +51,7 @@ class ResidualCoefficient(RangeRule):
 
     def limit(self, branch: SeriesBranch, tolerance: float, used: bool) -> Range:
         """Decided by ‖r_{p+1}‖/‖r_1‖ ≤ η."""
-        left = float(np.linalg.norm(branch.next_coefficient()))
+        left = norm(branch.next_coefficient())
         return Range(_growing(tolerance * branch.residual, left, branch.order), part(left, branch.residual), tolerance)
 
 
@@ -90,7 +90,7 @@ class PadePair(RangeRule):
 
         def excess(a: float) -> float:
             value = now(a)
-            return float(np.linalg.norm(value - before(a))) / (tolerance * float(np.linalg.norm(value)))
+            return norm(value - before(a)) / (tolerance * norm(value))
 
         at_end = excess(1.0)
         if at_end <= 1.0 or not used:

@@ -18,7 +18,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from nlsolve.plugin import SolveError, Status
+from nlsolve.plugin import SolveError, Status, norm
 
 Map = Callable[[np.ndarray], np.ndarray]
 
@@ -43,7 +43,7 @@ def gmres(product: Map, precondition: Map, b: np.ndarray, tolerance: float, most
     Preconditioned on the right, the residual that is minimised is the true one, and x = Z y needs no further solve.
     Raises SolveError (not finite) if a product is not finite.
     """
-    size = left = float(np.linalg.norm(b))
+    size = left = norm(b)
     basis, directions = np.empty((most + 1, len(b))), np.empty((most, len(b)))
     basis[0] = b / size
     triangle, rotated = np.zeros((most, most)), [size]  # R of the Hessenberg matrix, and Qᵀ e_1 ‖b‖
@@ -51,7 +51,7 @@ def gmres(product: Map, precondition: Map, b: np.ndarray, tolerance: float, most
     for k in range(most):
         directions[k] = precondition(basis[k])
         w: np.ndarray = product(directions[k])
-        length = float(np.linalg.norm(w))
+        length = norm(w)
         if not np.isfinite(length):
             raise SolveError(Status.NON_FINITE, "a product with the Jacobian was not finite")
         column = np.zeros(k + 1)
@@ -59,7 +59,7 @@ def gmres(product: Map, precondition: Map, b: np.ndarray, tolerance: float, most
             projections = basis[: k + 1] @ w
             w = w - projections @ basis[: k + 1]
             column += projections
-        beyond = float(np.linalg.norm(w))
+        beyond = norm(w)
         triangle[: k + 1, k], rotation = rotated_column([*column.tolist(), beyond], rotations)
         rotations.append(rotation)
         cosine, sine = rotation

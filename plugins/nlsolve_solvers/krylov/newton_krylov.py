@@ -8,7 +8,7 @@ from typing import ClassVar, Literal
 import numpy as np
 from pydantic import Field
 
-from nlsolve.plugin import Globalized, KeptTangent, NonlinearProblem, NonlinearSolver, Step, cached_jacobian
+from nlsolve.plugin import Globalized, KeptTangent, NonlinearProblem, NonlinearSolver, Step, cached_jacobian, norm
 from nlsolve_solvers.krylov.forcing import next_forcing
 from nlsolve_solvers.krylov.gmres import gmres
 
@@ -48,7 +48,7 @@ class NewtonKrylov(NonlinearSolver):
         residual = problem.residual(state)
         yield Step(state)
         while True:
-            size = float(np.linalg.norm(residual))
+            size = norm(residual)
             tangent.refresh_if_due(lambda: jacobian.operator(state))
             if size == 0.0:
                 yield Step(state)
@@ -60,7 +60,7 @@ class NewtonKrylov(NonlinearSolver):
             contraction = (found.left / size) ** (1.0 / found.count)
             tangent.observe(contraction=contraction)
             yield Step(state, notes={"length": length, "contraction": contraction})
-            size_now = float(np.linalg.norm(residual))
+            size_now = norm(residual)
             eta = max(next_forcing(self.forcing, eta, size_now, size, found.left), SMALLEST_FORCING)
 
 
