@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 
-from nlsolve.contracts.linear_solver import LinearSolver
+from nlsolve.contracts.linear_solver import Factors, LinearSolver
 from nlsolve.contracts.problem import NonlinearProblem, norm
 from nlsolve.contracts.status import SolveError
 from nlsolve.series import Array, NoSeries
@@ -27,7 +27,7 @@ FALLEN = 1e-4  # part of the size it began with below which an unknown is taken 
 BESIDE = 0.9  # part of an equation's terms that other unknowns have where it tells the size of an unknown by theirs
 SMALLEST = float(np.finfo(float).tiny / np.finfo(float).eps)  # |F_i| that has lost digits to underflow
 ROUNDING = 4.0 * float(np.finfo(float).eps)  # of r, or of ‖R‖ over the size of the terms of J u, where R is zero
-NOISE = 16.0 * float(np.finfo(float).eps)  # rounding of F_i over s_i
+NOISE = float(np.finfo(float).eps)  # rounding of F_i over s_i
 DENSE = 300  # unknowns up to which corrections are least-norm least squares, which a singular Jacobian allows
 NEAR = 0.01  # c from which no root is near
 SUPERLINEAR, SLOWEST = 0.4, 0.95  # contraction of Newton's steps below which m = 1, and above which none is near
@@ -149,6 +149,7 @@ class ByEquation(Measure):
     def __init__(self, problem: NonlinearProblem, start: Array, residual: Array, linear: LinearSolver) -> None:
         self._problem, self._linear = problem, linear
         self._known: tuple[Array, Any] | None = None
+        self._factors: Factors | None = None
         self._least = np.zeros_like(start)
         residual = np.where(np.isfinite(residual), residual, 0.0)
         begun = self._sizes_at(start, residual)
@@ -245,8 +246,8 @@ class ByEquation(Measure):
     def _solved(self, matrix: Any, wanted: Array) -> Array:
         if matrix.shape[0] <= DENSE:
             return np.linalg.lstsq(matrix.toarray(), wanted, rcond=None)[0]
-        factors = self._linear.factorize(matrix)
-        return np.column_stack([factors.solve(column) for column in wanted.T])
+        self._factors = self._linear.factorize(matrix, self._factors)
+        return np.column_stack([self._factors.solve(column) for column in wanted.T])
 
     def _sizes(self, u: Array, magnitudes: Any) -> Array:
         """d, (U,), without what equations see; an unknown of which nothing was known at the start has that too.
@@ -315,7 +316,8 @@ class ByEquation(Measure):
             return none
         matrix = sp.csr_array(scaled @ sp.diags_array(1.0 / columns))
         try:
-            found = self._linear.factorize(matrix).solve(residual / rows) / columns
+            self._factors = self._linear.factorize(matrix)
+            found = self._factors.solve(residual / rows) / columns
         except SolveError:
             return none
         return np.where(np.isfinite(found), np.abs(found), 0.0)

@@ -48,8 +48,10 @@ class RootSearch(Simulation):
     def solves(self) -> Generator[Solve, Outcome, Outcome]:
         """Yields the one problem; the status of its outcome tells another root from a known one."""
         outcome = yield Solve(self.problem, self.start)
-        judge = ByEquation(self.problem, self.start, self.problem.residual(self.start), self.linear)
         root = self.nearest_root(outcome.state)
+        if root is None and outcome.newton_correction <= SETTLED:
+            return outcome
+        judge = ByEquation(self.problem, self.start, self.problem.residual(self.start), self.linear)
         self.root_error = root_error(root, outcome.state, judge.begun)
         if outcome.status is Status.CONVERGED and not self.root_error <= NEAR:
             outcome, self.doubt = verified(self.problem, outcome, judge, self.start, root)
@@ -65,13 +67,15 @@ class RootSearch(Simulation):
 
 
 def root_error(root: Array | None, u: Array, begun: Array) -> float:
-    """max_j |u_j − root_j| / |root_j| for u and root (U,), over the size `begun` (U,) that an unknown began with where
-    its root is zero; NaN when no root is known.
+    """max_j |u_j − root_j| / |root_j| for u and root (U,); where root_j is zero, over the size `begun` (U,) that the
+    unknown began with, and where that is zero too, over the largest entry of the root, or of u. NaN when no root is
+    known.
     """
     if root is None:
         return np.nan
     sizes = np.where(np.abs(root) > VANISHED * begun, np.abs(root), begun)
-    return farthest(u - root, np.where(sizes > 0.0, sizes, np.abs(u)))
+    largest = float(np.abs(root).max(initial=0.0)) or float(np.abs(u).max(initial=0.0))
+    return farthest(u - root, np.where(sizes > 0.0, sizes, largest))
 
 
 def farthest(change: Array, sizes: Array) -> float:
@@ -98,12 +102,14 @@ def verified(
     """
     u = outcome.state
     residual = problem.residual(u)
+    settled = outcome.newton_correction <= SETTLED or judge.settled(u, residual, outcome.residual_norm, SETTLED)
+    if settled and root is None:
+        return outcome, ""
     steps = newton_steps(problem, u, judge)
     travelled = farthest(u - start, steps.sizes)
     left = judge.size(residual) / (judge.size(problem.residual(start)) or 1.0)
     expected = ALLOWED * travelled * left ** (1.0 / steps.multiplicity)
     shrink = steps.contraction <= SLOWEST and (steps.displacement <= NEAR * travelled or steps.distance <= expected)
-    settled = judge.settled(u, residual, judge.relative(u, residual), SETTLED)
     if settled or steps.displacement <= NEAR or shrink:
         found = Status.OTHER_ROOT
         is_known = root is None or (shrink and farthest(u - root, steps.sizes) <= 2.0 * steps.distance)

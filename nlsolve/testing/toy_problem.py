@@ -44,6 +44,10 @@ class ToyProblem(NonlinearProblem):
         """R(u), (U,)."""
         return self.matrix @ u + np.sinh(u) - (self.matrix @ self.solution + np.sinh(self.solution))
 
+    def scale(self, u: Array) -> float:
+        """1, the size of the right-hand side."""
+        return 1.0
+
     def jacobian(self, u: Array) -> Any:
         """J(u) = A + diag(cosh u), sparse (U, U)."""
         DenseLU.asked["jacobian"] += 1

@@ -6,12 +6,16 @@ from typing import Any, Literal
 
 import numpy as np
 from pydantic import Field
+from scipy.interpolate import CubicSpline
+from scipy.linalg import solve_banded
 
 from nlsolve.plugin import System
 from nlsolve_systems.grids import minus_laplacian, on_points, places
 
 STEEPEST = 1e3  # u′(0) up to which roots are looked for
 BISECTIONS = 80
+SHOT = 1023  # most points that roots are shot over
+REFINEMENTS, REFINED = 30, 1e-13  # Newton's steps on a finer grid, and the last of them over the largest |u|
 
 
 class Bratu(System):
@@ -38,9 +42,16 @@ class Bratu(System):
         return minus_laplacian(self.nodes, self.dimension)
 
     def roots(self) -> np.ndarray | None:
-        """In one dimension, by shooting: u_1 with u_{N+1} = 0 in u_{k+1} = 2 u_k − u_{k−1} − h² λ e^{u_k}."""
+        """In one dimension, by shooting: u_1 with u_{N+1} = 0 in u_{k+1} = 2 u_k − u_{k−1} − h² λ e^{u_k}; on a grid of
+        more than `SHOT` points by Newton's steps from the roots on one of `SHOT`.
+        """
         if self.dimension == 2:
             return None
+        if self.nodes > SHOT:
+            coarse = self.model_copy(update={"nodes": SHOT}).roots()
+            refined = [] if coarse is None else [self._refined(root) for root in coarse]
+            found = [root for root in refined if root is not None]
+            return np.array(found) if found else None
         first = np.geomspace(1e-6, STEEPEST, 400).astype(np.longdouble) / (self.nodes + 1)
         ends = self._shoot(first)[-1]
         crossings = np.flatnonzero((ends[1:] > 0.0) != (ends[:-1] > 0.0))
@@ -50,6 +61,24 @@ class Bratu(System):
             behind = (self._shoot(middle)[-1] > 0.0) == rising
             low, high = np.where(behind, low, middle), np.where(behind, middle, high)
         return self._shoot(low)[:-1].T.astype(float) if len(low) else None
+
+    def _refined(self, coarse: np.ndarray) -> np.ndarray | None:
+        """The root near one on `SHOT` points, whose corrections are solved for in double precision; None if they do not
+        become small.
+        """
+        ends = np.linspace(0.0, 1.0, SHOT + 2)
+        u = CubicSpline(ends, [0.0, *coarse, 0.0])(places(self.nodes)).astype(np.longdouble)
+        square = np.longdouble(self.nodes + 1) ** 2
+        bands = np.full((3, self.nodes), -float(square))
+        for _ in range(REFINEMENTS):
+            growth = self.strength * np.exp(u)
+            residual = square * (2.0 * u - np.append(u[1:], 0.0) - np.append(0.0, u[:-1])) - growth
+            bands[1] = 2.0 * float(square) - growth.astype(float)
+            step = solve_banded((1, 1), bands, residual.astype(float))
+            u = u - step
+            if np.abs(step).max() <= REFINED * np.abs(u).max():
+                return u.astype(float)
+        return None
 
     def _shoot(self, first: np.ndarray) -> np.ndarray:
         """u_1 … u_{N+1} for each of the u_1, (N + 1, K)."""

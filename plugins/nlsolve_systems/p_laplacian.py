@@ -13,7 +13,8 @@ from pydantic import Field
 from nlsolve.plugin import System
 from nlsolve_systems.grids import on_points, places, slopes
 
-BISECTIONS = 200
+BISECTIONS = 80
+REFINEMENTS = 3
 
 
 class PLaplacian(System):
@@ -55,9 +56,16 @@ class PLaplacian(System):
             return None
         h = np.longdouble(1) / (self.nodes + 1)
         flux = 0.5 - (np.arange(self.nodes + 1) + np.longdouble(0.5)) * h
-        low, high = np.zeros_like(flux), np.ones_like(flux) * (1.0 + np.abs(flux)) ** (1.0 / (self.power - 1.0))
+        wanted = np.abs(flux).astype(float)
+        low, high = np.zeros_like(wanted), (1.0 + wanted) ** (1.0 / (self.power - 1.0))
         for _ in range(BISECTIONS):
             slope = 0.5 * (low + high)
-            behind = slope * (slope**2 + self.regularization**2) ** (0.5 * self.power - 1.0) > np.abs(flux)
+            behind = slope * (slope**2 + self.regularization**2) ** (0.5 * self.power - 1.0) > wanted
             low, high = np.where(behind, low, slope), np.where(behind, slope, high)
-        return np.cumsum(h * np.sign(flux) * low)[None, :-1].astype(float)
+        slope = low.astype(np.longdouble)
+        for _ in range(REFINEMENTS):  # Newton's, of what bisection in double precision has left
+            square = slope**2 + self.regularization**2
+            viscosity = square ** (0.5 * self.power - 1.0)
+            excess = slope * viscosity - np.abs(flux)
+            slope = slope - excess / (viscosity * (1.0 + (self.power - 2.0) * slope**2 / square))
+        return np.cumsum(h * np.sign(flux) * slope)[None, :-1].astype(float)

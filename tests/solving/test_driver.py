@@ -35,6 +35,9 @@ class Scalar(NonlinearProblem):
     def residual(self, u: np.ndarray) -> np.ndarray:
         return self.f(u)
 
+    def scale(self, u: np.ndarray) -> float:
+        return 1.0
+
     def jacobian(self, u: np.ndarray) -> Any:
         return sp.csr_array(np.atleast_2d(self.f(Series.seed(u)).coefficient(1)))
 
