@@ -9,7 +9,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from nlsolve.algebra.colouring import Colouring
-from nlsolve.contracts.problem import Expansion, NonlinearProblem
+from nlsolve.contracts.problem import PROBES, Expansion, NonlinearProblem, random_signs
 from nlsolve.contracts.status import InputError, SolveError, Status
 from nlsolve.series import Array, NoSeries, NoSeriesHere, Series
 
@@ -21,12 +21,6 @@ LONGEST_VALUE = 60
 
 WIDEST = 2000
 """Most columns, or groups of columns, of a Jacobian that is made only to judge a state."""
-
-PROBES = 16
-"""Random directions by which the terms of the equations of wider ones are estimated."""
-
-STEP = float(np.sqrt(np.finfo(float).eps))
-"""Step of a difference over the size of the unknown."""
 
 UNFIT = (AttributeError, IndexError, TypeError, ValueError)
 """What Python and NumPy raise when a formula for arrays asks of a series what only an array has."""
@@ -108,23 +102,16 @@ class FormulaProblem(NonlinearProblem):
             if error.status is not Status.NOT_APPLICABLE:
                 raise
         steps = np.where(sizes > 0.0, sizes, 1.0)
-        product = self._colouring.unpack(self._differences(u, steps[:, None] * self._colouring.seeds))
+        product = self._colouring.unpack(self.differences(u, steps[:, None] * self._colouring.seeds))
         return product @ sp.diags_array(1.0 / steps)
 
-    def estimated_terms(self, u: Array, sizes: Array) -> Array | None:
-        """(Σ_j (J_ij d_j)²)^½, (U,), as the root mean square of J D z over random signs z."""
-        signs = np.where(np.random.default_rng(0).random((len(u), PROBES)) < 0.5, -1.0, 1.0)
-        directions = sizes[:, None] * signs
+    def estimated_terms(self, u: Array, sizes: Array) -> Array:
+        """See `NonlinearProblem`; by products with J where F runs on a series."""
         try:
-            products = self.derivative(u, directions)
+            products = self.derivative(u, sizes[:, None] * random_signs(len(u), PROBES))
         except (SolveError, NoSeries):
-            products = self._differences(u, directions)
+            return super().estimated_terms(u, sizes)
         return np.sqrt((products**2).mean(axis=1))
-
-    def _differences(self, u: Array, directions: Array) -> Array:
-        """J(u) W for directions W, both (U, C), by differences of F."""
-        before = self.residual(u)
-        return np.stack([(self.residual(u + STEP * w) - before) / STEP for w in directions.T], axis=1)
 
     def expand(self, u: Array) -> Expansion:
         """The formula run on a series that begins with u. Raises SolveError (not applicable) when F does not

@@ -19,7 +19,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from nlsolve.contracts.linear_solver import Factors, LinearSolver
-from nlsolve.contracts.problem import NonlinearProblem, norm
+from nlsolve.contracts.problem import NonlinearProblem, norm, random_signs
 from nlsolve.contracts.status import SolveError
 from nlsolve.series import Array, NoSeries
 
@@ -216,8 +216,7 @@ class ByEquation(Measure):
         sizes = np.fmax(sizes, FALLEN * seen_by_equations(magnitudes, terms))
         sizes[~(sizes > 0.0)] = 1.0
         matrix = rows @ jacobian @ sp.diags_array(sizes)
-        signs = np.where(np.random.default_rng(0).random((len(u), 2)) < 0.5, -1.0, 1.0)
-        wanted = np.column_stack([-residual / terms, signs])
+        wanted = np.column_stack([-residual / terms, random_signs(len(u), 2)])
         try:
             found = self._solved(sp.csr_array(matrix), wanted)
         except SolveError:
@@ -270,7 +269,7 @@ class ByEquation(Measure):
         else:
             magnitudes = abs(jacobian)
             terms = magnitudes @ self._sizes(u, magnitudes)
-        return np.zeros_like(u) if terms is None else np.nan_to_num(terms, nan=0.0)
+        return np.nan_to_num(terms, nan=0.0)
 
     def _jacobian(self, u: Array) -> Any:
         """J(u), sparse (U, U), kept while u stays the same; None where there is none."""
@@ -300,7 +299,7 @@ class ByEquation(Measure):
         """1/s_i at the start, (U,), of 1 where an equation has no size there."""
         jacobian = self._jacobian(start)
         terms = self._problem.estimated_terms(start, self.begun) if jacobian is None else abs(jacobian) @ self.begun
-        terms = np.fmax(np.zeros_like(start) if terms is None else terms, np.abs(residual))
+        terms = np.fmax(terms, np.abs(residual))
         weights = np.divide(1.0, terms, out=np.ones_like(terms), where=terms > 0.0)
         return np.where(np.isfinite(weights), weights, 1.0)
 

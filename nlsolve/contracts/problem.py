@@ -11,6 +11,15 @@ import numpy as np
 from nlsolve.contracts.status import SolveError, Status
 from nlsolve.series import Array, Series
 
+FEW = 300
+"""Most unknowns of a problem without a Jacobian that differences of its residual make one for, to judge a state."""
+
+PROBES = 16
+"""Random directions by which the terms of the equations of others are estimated."""
+
+STEP = float(np.sqrt(np.finfo(float).eps))
+"""Step of a difference over the size of the unknown."""
+
 SAFE = 1e-150, 1e150
 """Between these a sum of squares neither overflows nor loses digits to underflow."""
 
@@ -32,6 +41,11 @@ def unit(vector: Array) -> float:
     """
     largest = float(np.abs(vector).max(initial=0.0))
     return float(np.ldexp(0.5, np.frexp(largest)[1])) if 0.0 < largest < np.inf else 1.0
+
+
+def random_signs(size: int, count: int) -> Array:
+    """Columns of ±1, (U, C), the same ones whenever they are asked for."""
+    return np.where(np.random.default_rng(0).random((size, count)) < 0.5, -1.0, 1.0)
 
 
 class Expansion:
@@ -175,10 +189,28 @@ class NonlinearProblem(ABC):
     def linearisation(self, u: Array, sizes: Array) -> Any:
         """J(u), or what comes near it, by which a state is judged, outside of methods; None where that costs too much.
 
-        sizes : of the unknowns, (U,). Raises SolveError when there is none.
-        """
-        return self.jacobian(u)
+        A problem of few unknowns that has no Jacobian is judged by differences of R.
 
-    def estimated_terms(self, u: Array, sizes: Array) -> Array | None:
-        """About Σ_j |J_ij| d_j for `sizes` d, (U,), where `linearisation` gives nothing; None: not known."""
-        return None
+        sizes : of the unknowns, (U,). Raises SolveError when J does not exist at u.
+        """
+        try:
+            return self.jacobian(u)
+        except SolveError as error:
+            if error.status is not Status.NOT_APPLICABLE:
+                raise
+        if len(u) > FEW:
+            return None
+        steps = np.where(sizes > 0.0, sizes, 1.0)
+        return self.differences(u, np.diag(steps)) / steps
+
+    def estimated_terms(self, u: Array, sizes: Array) -> Array:
+        """(Σ_j (J_ij d_j)²)^½ for `sizes` d, (U,), where `linearisation` gives nothing: the root mean square of J D z
+        over random signs z, by differences of R.
+        """
+        products = self.differences(u, sizes[:, None] * random_signs(len(u), PROBES))
+        return np.sqrt((products**2).mean(axis=1))
+
+    def differences(self, u: Array, directions: Array) -> Array:
+        """About J(u) W for directions W of the size of the unknowns, both (U, C)."""
+        before = self.residual(u)
+        return np.stack([(self.residual(u + STEP * w) - before) / STEP for w in directions.T], axis=1)

@@ -25,8 +25,8 @@ RIGHT, DOUBTED, WRONG = "right", "doubted", "wrong"
 AT_A_SOLUTION = frozenset({Status.CONVERGED, Status.OTHER_ROOT})
 """Statuses of runs that met their stopping test."""
 
-BY_RESIDUALS = frozenset({"residual", "absolute"})
-"""The kinds of stopping test that ask for the residual, so that a state which has met them is solved."""
+BY_RESIDUAL, ABSOLUTE = "residual", "absolute"
+"""The kinds of stopping test whose tolerance bounds a relative residual, and ‖R‖ itself."""
 
 Run = Mapping[str, Any]
 """A row of `runs`, by the names of its columns."""
@@ -55,13 +55,15 @@ def outcome(run: Run, accepted: float = ACCEPTED, error: str = "velocity_error")
 def solved(run: Run, accepted: float = ACCEPTED, error: str = "velocity_error") -> bool:
     """At a solution, by a small enough residual evaluated outside the method, with an error ≤ accepted.
 
-    Small enough is what meets a stopping test on the residual; after a difference or a claim it is `VERIFIED`.
+    Small enough is the tolerance of a stopping test on the residual, and what meets an absolute one; after a difference
+    or a claim it is `VERIFIED`.
     A doubt takes nothing from a small error; an error nobody knows must be beyond doubt. A root that is not among the
     known ones is a root.
     """
     status = status_of(run)
-    by_residual = run.get("stop.kind") in BY_RESIDUALS
-    if status not in AT_A_SOLUTION or not (by_residual or number(run.get("residual_norm")) <= VERIFIED):
+    bounds = {BY_RESIDUAL: number(run.get("stop.tolerance")), ABSOLUTE: np.inf}
+    limit = bounds.get(str(run.get("stop.kind")), VERIFIED)
+    if status not in AT_A_SOLUTION or not number(run.get("residual_norm")) <= limit:
         return False
     known = number(run.get(error))
     return status is Status.OTHER_ROOT or (not doubt(run) if np.isnan(known) else known <= accepted)

@@ -21,7 +21,7 @@ from nlsolve.solving.work.counted_problem import CountedProblem
 from nlsolve.solving.work.ledger import Ledger
 
 GROWTH_OF_DIVERGENCE = 1e6  # residual over the larger of its first value and its scale
-PATIENCE = 40  # steps without a new smallest residual, by either of its sizes, after which a method has stagnated
+PATIENCE = 40  # steps without a new smallest residual, by any of its sizes, after which a method has stagnated
 
 
 @np.errstate(all="ignore")  # what is not finite becomes a status, not a warning
@@ -87,7 +87,7 @@ def solve(
             "leave `operator` at its default, or choose a method that keeps any K*, such as modified-newton",
         )
     iterator = iter(solver.steps(counted, tangent, start))
-    first, best = np.inf, np.full(2, np.inf)
+    first, best = np.inf, np.full(3, np.inf)
     since_best = 0
     for number in range(budget.iterations + 1):
         try:
@@ -139,7 +139,7 @@ def solve(
             first = progress
         if progress > GROWTH_OF_DIVERGENCE * max(1.0, first):
             return ended(Status.DIVERGED)
-        now = np.array([progress, norm(measure.weighted(residual))])
+        now = np.array([progress, norm(measure.weighted(residual)), residual_norm])
         since_best = 0 if (now < best).any() else since_best + 1
         best = np.fmin(best, now)
         if since_best >= PATIENCE:

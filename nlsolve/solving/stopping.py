@@ -11,7 +11,7 @@ from pydantic import Field
 from nlsolve.contracts.component import Component
 from nlsolve.contracts.nonlinear_solver import Step
 from nlsolve.contracts.problem import norm
-from nlsolve.results.verdicts import BY_RESIDUALS, VERIFIED
+from nlsolve.results.verdicts import ABSOLUTE, BY_RESIDUAL, VERIFIED
 from nlsolve.series import Array
 
 
@@ -54,7 +54,7 @@ class StoppingTest(Component):
     @property
     def is_of_residuals(self) -> bool:
         """Whether the test asks for the residual alone, so that what passes it is solved."""
-        return self.kind in BY_RESIDUALS
+        return self.kind in (BY_RESIDUAL, ABSOLUTE)
 
     def met(self, step: Step, solved: Callable[[], bool], difference: float) -> bool:
         """Whether a step passes, with its relative difference from the step before.

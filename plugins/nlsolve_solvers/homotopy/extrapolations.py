@@ -11,6 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from nlsolve.plugin import unit
+
 NOISE = 1e-10  # directions of the W_j below this part of the largest are rounding and lower the degree of Δ
 ON_THE_PATH = 1.1  # a positive real pole up to here spoils W(a) on 0 < a ≤ 1
 LARGEST_GROWTH = (1e-200, 1e200)  # of W_p over W_1 that the scaling of the fit follows
@@ -60,6 +62,7 @@ def pade(columns: np.ndarray, m: int) -> Extrapolation:
     Exact for a rational W(a) whose denominator and numerator have degrees ≤ m.
     """
     p = columns.shape[1]
+    columns = columns / unit(columns)
     sizes = np.linalg.norm(columns, axis=0)
     growth = float(np.clip(max(sizes[-2:]) / sizes[0], *LARGEST_GROWTH)) ** (1.0 / (p - 1))
     scaled = columns / (sizes[0] * growth ** np.arange(p))
