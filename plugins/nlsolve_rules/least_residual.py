@@ -30,7 +30,7 @@ class Backtracking(Globalization):
 
     kind: Literal["backtracking"] = "backtracking"
     trials: int = Field(10, gt=0, description="lengths t that may be tried besides the full step")
-    measure: ComparedBy = Field("euclidean", description=COMPARED_BY)
+    measure: ComparedBy = Field("equations", description=COMPARED_BY)
 
     def search(self, problem: NonlinearProblem) -> Search:
         """The search of one solve; a step is compared with the last residual alone."""
@@ -62,7 +62,7 @@ class LeastResidual:
     """The search of these three; they differ in how many residuals a step is compared with, and in the next t."""
 
     def __init__(
-        self, trials: int, memory: int, shorter: Callable[[Trials, float], float], measure: ComparedBy = "euclidean"
+        self, trials: int, memory: int, shorter: Callable[[Trials, float], float], measure: ComparedBy = "equations"
     ) -> None:
         self._trials, self._shorter, self._measure = trials, shorter, measure
         self._sizes: deque[float] = deque(maxlen=memory)

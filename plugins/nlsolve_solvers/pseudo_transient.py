@@ -22,7 +22,7 @@ class PseudoTransient(NonlinearSolver):
     kind: Literal["pseudo-transient"] = "pseudo-transient"
     shift: float = Field(1.0, gt=0, description="σ of the first step; 1/σ is its length in time")
     measure: Literal["euclidean", "equations"] = Field(
-        "euclidean",
+        "equations",
         description="how residuals are compared: by ‖R‖₂, or by each equation over the largest terms that it has had, "
         "which no unit changes (the same for a flow)",
     )

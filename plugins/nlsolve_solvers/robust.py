@@ -50,7 +50,7 @@ class Robust(NonlinearSolver):
     def steps(self, problem: NonlinearProblem, tangent: KeptTangent, start: np.ndarray) -> Iterator[Step]:
         """The states of all methods tried, one after the other. Raises SolveError, as the last of them did."""
         yield Step(start)
-        reached = yield from self._descent(newton(), problem, tangent, start, self.patience)
+        reached = yield from self._descent(Newton(), problem, tangent, start, self.patience)
         stuck = reached.stuck
         for _ in range(self.leaps):
             try:
@@ -62,7 +62,7 @@ class Robust(NonlinearSolver):
             if landed is None:
                 break
             yield Step(landed)
-            reached = yield from self._descent(newton(), problem, tangent, landed, self.patience)
+            reached = yield from self._descent(Newton(), problem, tangent, landed, self.patience)
         failure = yield from self._relaxation(problem, tangent, start, stuck)
         yield from self._escape(problem, tangent, reached.state)
         tried = "tried: steps of least norm and random moves, from which ‖R‖ does not fall to zero either"
@@ -103,9 +103,9 @@ class Robust(NonlinearSolver):
         """Pseudo-transient continuation; returns how it failed, if that leaves something to try."""
         if stuck:
             yield Step(start)
-            return (yield from self._descent(pseudo_transient(), problem, tangent, start, SHORT)).failure
+            return (yield from self._descent(PseudoTransient(), problem, tangent, start, SHORT)).failure
         try:
-            yield from pseudo_transient().steps(problem, tangent, start)
+            yield from PseudoTransient().steps(problem, tangent, start)
         except SolveError as error:
             if error.status is not Status.SINGULAR_TANGENT:
                 raise
@@ -118,17 +118,7 @@ class Robust(NonlinearSolver):
             state = yield from least_norm_descent(problem, tangent, state)
             state = moved(problem, state, size, attempt)
             yield Step(state)
-            state = (yield from self._descent(newton(), problem, tangent, state, SHORT)).state
-
-
-def newton() -> Newton:
-    """Newton's method with backtracking that no unit of an equation changes."""
-    return Newton(globalization={"kind": "backtracking", "measure": "equations"})
-
-
-def pseudo_transient() -> PseudoTransient:
-    """Pseudo-transient continuation with time steps that no unit of an equation changes."""
-    return PseudoTransient(measure="equations")
+            state = (yield from self._descent(Newton(), problem, tangent, state, SHORT)).state
 
 
 @dataclass(frozen=True)
