@@ -63,8 +63,8 @@ def assert_the_same(system: Published, method: Any) -> None:
         assert found is None or np.array_equal(found.x, start)
         return
     assert found is not None
-    # The driver looks at the state that SciPy ends at, uncounted; the rest is what SciPy asks for.
-    asked = ours.points[: ledger.counts["residual"]]
+    # The driver looks at the start and at the state that SciPy ends at, uncounted; the rest is what SciPy asks for.
+    asked = ours.points[1 : 1 + ledger.counts["residual"]]
     assert len(theirs.points) == ledger.counts["residual"]
     np.testing.assert_array_equal(np.array(asked), np.array(theirs.points))
     np.testing.assert_array_equal(outcome.state, found.x)
