@@ -88,7 +88,8 @@ def test_powells_singular_function():
     outcome = nlsolve.solve(powell, START)
     assert outcome.status is nlsolve.Status.CONVERGED
     assert outcome.residual_norm <= 1e-8
-    assert np.linalg.norm(powell(outcome.state)) == pytest.approx(outcome.residual_norm)
+    assert np.linalg.norm(powell(outcome.state)) == pytest.approx(outcome.residual_absolute)
+    assert outcome.newton_correction <= 1e-8
     assert np.abs(outcome.state).max() < 1e-3
     same = nlsolve.solve(POWELL)
     np.testing.assert_allclose(outcome.state, same.state, rtol=1e-6)

@@ -269,7 +269,7 @@ def test_a_mistake_in_a_study_is_told_with_its_place(value: Any, sentence: str) 
 def test_nested_kinds_are_listed_among_the_plugins() -> None:
     rows = {row.kind: row for row in load_registry().plugins() if row.noun == "globalization"}
     assert set(rows) == {"none", "backtracking", "cubic", "non-monotone", "energy"}
-    assert [parameter.name for parameter in rows["non-monotone"].parameters] == ["trials", "memory"]
+    assert [parameter.name for parameter in rows["non-monotone"].parameters] == ["trials", "measure", "memory"]
 
 
 def test_a_residual_beyond_all_bounds_shortens_the_step() -> None:
