@@ -18,6 +18,7 @@ from pydantic import ValidationError
 
 import nlsolve
 from nlsolve import SolveError, Status
+from nlsolve.algebra.measure import ByScale
 from nlsolve.contracts.outcome import Outcome
 from nlsolve.plugin import NonlinearSolver, RefreshRule
 from nlsolve.results.columns import REPORTED
@@ -153,10 +154,11 @@ def test_the_drivers_own_scale_costs_a_method_nothing() -> None:
     ledger = Ledger()
     flow = spin_flow(0.5)
     counted = CountedProblem(flow, ledger)
-    scale = counted.uncounted_scale(START_OF_FLOW := near(flow, 0.52))
-    assert counted.scale(START_OF_FLOW.copy()) == scale == flow.scale(START_OF_FLOW)
+    start = near(flow, 0.52)
+    counted.judged_by(ByScale(flow, flow.scale(start)), start)
+    assert counted.scale(start.copy()) == flow.scale(start)
     assert ledger.counts["residual"] == 0
-    assert counted.scale(2.0 * START_OF_FLOW) == flow.scale(2.0 * START_OF_FLOW)
+    assert counted.scale(2.0 * start) == flow.scale(2.0 * start)
     assert ledger.counts["residual"] == 1
 
 
