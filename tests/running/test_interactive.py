@@ -89,7 +89,7 @@ def test_powells_singular_function():
     assert outcome.status is nlsolve.Status.CONVERGED
     assert outcome.residual_norm <= 1e-8
     assert np.linalg.norm(powell(outcome.state)) == pytest.approx(outcome.residual_absolute)
-    assert outcome.newton_correction <= 1e-8
+    assert outcome.newton_correction <= 1e-6
     assert np.abs(outcome.state).max() < 1e-3
     same = nlsolve.solve(POWELL)
     np.testing.assert_allclose(outcome.state, same.state, rtol=1e-6)
