@@ -145,7 +145,7 @@ def validate(
     """Check a study, and its quick form if it has one, without running it."""
     with ending():
         checked = checked_study(study, settings, False, plugin, disable_plugin)
-        quick = checked_study(study, settings, True, plugin, disable_plugin) if checked.has_quick else None
+        quick = checked_study(study, settings, True, plugin, disable_plugin, False) if checked.has_quick else None
     found = {"study": checked.name, "question": checked.question, "cases": len(checked.cases)}
     found |= {"quick_cases": len(quick.cases)} if quick else {}
     found |= {"excluded": [asdict(excluded) for excluded in checked.excluded]} if checked.excluded else {}

@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from nlsolve.cli.disabling import disable
+from nlsolve.cli.printing import say
 from nlsolve.registry.plugin_files import with_files
 from nlsolve.registry.registry import Registry, load_registry
 from nlsolve.study.study import Study
@@ -17,7 +18,7 @@ StudyFile = Annotated[Path, typer.Argument(metavar="STUDY", help="a study file (
 Settings = Annotated[
     list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="set a parameter, such as solver.order=20")
 ]
-Quick = Annotated[bool, typer.Option("--quick", help="the shrunk study of the file's [quick] section")]
+Quick = Annotated[bool, typer.Option("--quick", help=r"the shrunk study of the file's \[quick] section")]
 Out = Annotated[Path | None, typer.Option(help="results folder; default: results/NAME or results/NAME-quick")]
 PluginFiles = Annotated[
     list[Path] | None,
@@ -63,7 +64,18 @@ def registry_of(files: list[Path] | None, disabled: list[str] | None) -> Registr
 
 
 def checked_study(
-    path: Path, settings: list[str] | None, quick: bool, files: list[Path] | None, disabled: list[str] | None
+    path: Path,
+    settings: list[str] | None,
+    quick: bool,
+    files: list[Path] | None,
+    disabled: list[str] | None,
+    tell: bool = True,
 ) -> Study:
-    """The study of a file with these settings and plugins. Raises StudyError for one that is not valid."""
-    return Study.from_toml(path, parse_assignments(settings or []), quick, registry_of(files, disabled))
+    """The study of a file with these settings and plugins. Raises StudyError for one that is not valid.
+
+    tell : whether a line on standard error tells of each plugin that failed: to try one may take its time.
+    """
+    registry = registry_of(files, disabled)
+    for row in registry.failures if tell else ():
+        say(f"{row.failure}; --disable-plugin {row.source.partition(' ')[0]} spares the attempt")
+    return Study.from_toml(path, parse_assignments(settings or []), quick, registry)

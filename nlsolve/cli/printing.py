@@ -18,7 +18,7 @@ from nlsolve.contracts.status import Status
 from nlsolve.flow.validity import LIMITS
 from nlsolve.registry.registry import PluginRow
 from nlsolve.results.frames import json_rows, rows_of
-from nlsolve.results.verdicts import status_of
+from nlsolve.results.verdicts import doubt, number, status_of
 from nlsolve.running.retry import is_final
 from nlsolve.running.runner import Results
 from nlsolve.running.store.reading import output_file
@@ -45,8 +45,8 @@ def count(cases: int) -> str:
 def say_excluded(study: Study) -> None:
     """Say how many cases a study leaves out, and why."""
     reasons = Counter(excluded.reason for excluded in study.excluded)
-    for reason, number in reasons.items():
-        say(f"left out: {count(number)}: {reason}")
+    for reason, cases in reasons.items():
+        say(f"left out: {count(cases)}: {reason}")
 
 
 def stdout() -> Console:
@@ -118,21 +118,38 @@ def print_plugins(rows: list[PluginRow]) -> None:
 
 
 def say_endings(results: Results) -> None:
-    """Say how many cases ended how, with the message of one case of each ending that is no convergence."""
+    """Say how many cases ended how, with the message of one case of each ending that is no convergence, and one of
+    the doubts that no audit explains."""
     runs = results.runs
-    endings = ", ".join(f"{number} {word}" for word, number in runs["status"].value_counts().items())
+    numbers = {str(word): int(cases) for word, cases in runs["status"].value_counts().items()}
+    endings = ", ".join(f"{cases} {word}" for word, cases in numbers.items())
     say(f"{count(len(runs))}: {endings or 'none has ended'}; results in {results.folder}")
     firsts = {status_of(run): run for run in rows_of(runs.drop_duplicates("status"))}
     firsts.pop(Status.CONVERGED, None)
     crash = firsts.pop(Status.CRASHED, None)
     for status, run in firsts.items():
-        say(f"case {run['case']} ended as {status.word}: {run['message']}{_printed(results, run)}")
+        more = _more(numbers[status.word])
+        say(f"case {run['case']}{more} ended as {status.word}: {run['message']}{_printed(results, run)}")
     if crash is not None:
-        say(f"case {crash['case']} crashed: {crash['message']}{_printed(results, crash)}")
+        more = _more(numbers[Status.CRASHED.word])
+        say(f"case {crash['case']}{more} crashed: {crash['message']}{_printed(results, crash)}")
+    doubted = [run for run in rows_of(runs) if doubt(run) and not _is_audited(run)]
+    if doubted:
+        say(f"case {doubted[0]['case']}{_more(len(doubted))} is in doubt: {doubt(doubted[0])}")
     kept = sorted({run["status"] for run in rows_of(runs) if is_final(run)})
     if kept:
         options = " ".join(f"--retry {word!r}" for word in kept)
         say(f"what was stopped at a limit is run again when the limit is raised, and all of these with {options}")
+
+
+def _is_audited(run: Mapping[str, Any]) -> bool:
+    """Whether an audit explains the doubt, which `left_out` tells."""
+    return any(limit.doubt and number(run.get(name)) > limit.largest for name, limit in LIMITS.items())
+
+
+def _more(cases: int) -> str:
+    """What is said of the other cases that ended as the one that is told."""
+    return f" (one of {cases})" if cases > 1 else ""
 
 
 def _printed(results: Results, run: Mapping[str, Any]) -> str:

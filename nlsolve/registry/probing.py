@@ -78,7 +78,7 @@ def import_all(entries: Sequence[Sequence[str]], report: int) -> None:
         try:
             EntryPoint(*entry).load()
         except (SystemExit, KeyboardInterrupt) as error:
-            os.write(report, f"{type(error).__name__}: {error}\n".encode())
+            os.write(report, f"{type(error).__name__}: {error}".rstrip(": ").encode() + b"\n")
         except Exception:  # is met again, and told, where the plugin is imported to be used
             os.write(report, b"\n")
         else:

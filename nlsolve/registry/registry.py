@@ -374,6 +374,11 @@ class Registry:
                 rows.append(PluginRow(noun, name, offer.source, parameters_of(offer.cls), failure))
         return rows + self._failures + self._disabled
 
+    @property
+    def failures(self) -> tuple[PluginRow, ...]:
+        """A row for every plugin that failed."""
+        return tuple(self._failures)
+
     @contextmanager
     def in_use(self) -> Iterator[None]:
         """Let components inside components be looked up in this registry."""

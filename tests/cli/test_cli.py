@@ -82,7 +82,7 @@ def test_divergence_is_a_result(tmp_path, monkeypatch):
     result = nlsolve("run", write_study(tmp_path))
     assert result.exit_code == 0
     assert "4 cases: 4 diverged" in result.stderr
-    assert "ended as diverged: " in result.stderr
+    assert " (one of 4) ended as diverged: " in result.stderr
 
 
 def test_a_crash_is_1(tmp_path, monkeypatch):
@@ -339,3 +339,7 @@ def test_a_disabled_plugin(monkeypatch, tmp_path):
 
 def test_version():
     assert nlsolve("--version").stdout == f"nlsolve {version('nlsolve')}\n"
+
+
+def test_the_help_names_the_section_of_the_shrunk_study():
+    assert "[quick]" in nlsolve("run", "--help").stdout

@@ -24,13 +24,16 @@ zip = { "solver.kind" = ["newton", "faults", "tells", "loops"], "limits.seconds"
 """
 
 
-def command(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
-    """`nlsolve …` in a process of its own, with the planted plugins installed."""
+SOURCE = Path(planted.__file__).read_text(encoding="utf-8")
+
+
+def command(folder: Path, *arguments: str, source: str = SOURCE) -> subprocess.CompletedProcess[str]:
+    """`nlsolve …` in a process of its own, with the planted plugins installed, or those of another source."""
     packages = folder / "packages"
     (packages / "planted-1.0.dist-info").mkdir(parents=True, exist_ok=True)
     (packages / "planted-1.0.dist-info" / "METADATA").write_text("Metadata-Version: 2.1\nName: planted\nVersion: 1.0\n")
     (packages / "planted-1.0.dist-info" / "entry_points.txt").write_text("[nlsolve]\nplanted = planted\n")
-    (packages / "planted.py").write_text(Path(planted.__file__).read_text(encoding="utf-8"), encoding="utf-8")
+    (packages / "planted.py").write_text(source, encoding="utf-8")
     return subprocess.run(
         [sys.executable, "-c", "from nlsolve.cli.main import main; main()", *arguments],
         cwd=folder,
@@ -99,3 +102,23 @@ def test_pdb_is_called_where_the_error_is_raised(tmp_path, monkeypatch):
     assert result.exit_code == 1
     assert len(debugged) == 2
     assert "RuntimeError: [oops]" in result.stderr
+
+
+def test_work_in_other_processes_and_values_that_cannot_be_sent_are_told(tmp_path):
+    kinds = '["forks", "unsendable"], "limits.seconds" = [60, 60] }'
+    text = STUDY.replace('["newton", "faults", "tells", "loops"], "limits.seconds" = [60, 60, 60, 2] }', kinds)
+    (tmp_path / "study.toml").write_text(text)
+    told = command(tmp_path, "run", "study.toml")
+    assert told.returncode == 1
+    assert "is in doubt: the case left processes running, whose work is not counted" in told.stderr
+    assert "a plugin has put a value into the case's rows that cannot be pickled: Can't pickle local" in told.stderr
+
+
+def test_a_plugin_that_cannot_be_imported_is_told_by_a_command_that_tries_it(tmp_path):
+    (tmp_path / "study.toml").write_text(STUDY[: STUDY.index("[[sweep]]")])
+    told = command(tmp_path, "validate", "study.toml", source="raise KeyboardInterrupt")
+    assert told.returncode == 0
+    reason = "the plugin 'planted' cannot be imported: it raises KeyboardInterrupt"
+    assert told.stderr == f"{reason}; --disable-plugin planted spares the attempt\n"
+    disabled = command(tmp_path, "validate", "study.toml", "--disable-plugin", "planted", source="1 / 0")
+    assert (disabled.returncode, disabled.stderr) == (0, "")

@@ -39,7 +39,7 @@ PLANTED = {
     "e_loops": ("while True: pass", "it takes more than 2 s"),
     "f_floods": ("while True: print('x' * 1000)", "it prints more than 100000 bytes"),
     "g_faults": ("import ctypes; ctypes.string_at(0)", "it ends the interpreter with SIGSEGV"),
-    "h_interrupts": ("raise KeyboardInterrupt", "it raises KeyboardInterrupt: "),
+    "h_interrupts": ("raise KeyboardInterrupt", "it raises KeyboardInterrupt"),
     "i_raises": ("1 / 0", None),
     "j_moves": ("import os; os.chdir('/'); print('a word')\n" + SOUND, None),
 }

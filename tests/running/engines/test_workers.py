@@ -52,7 +52,7 @@ ENDINGS = {
     "patches-clocks": ("converged", None, ""),
     "tells": ("converged", None, ""),
     "slow": ("converged", None, ""),
-    "unsendable": ("crashed", None, "Can't pickle local object"),
+    "unsendable": ("crashed", None, "cannot be pickled: Can't pickle local object"),
 }
 """Status, interpreter, and a pattern for the message, for each kind of planted solver."""
 

@@ -137,7 +137,9 @@ class Worker:
             data = pickle.dumps(answer, pickle.HIGHEST_PROTOCOL)
         except Exception as error:  # a value of a plugin's in the rows
             assert task is not None
-            data = pickle.dumps(Ended(part_of_error(task.case, task.parameters, Sections(), error), "an answer"))
+            reason = TypeError(f"a plugin has put a value into the case's rows that cannot be pickled: {error}")
+            part = part_of_error(task.case, task.parameters, Sections(), reason.with_traceback(error.__traceback__))
+            data = pickle.dumps(Ended(part, "an answer"))
         self.connection.send_bytes(data)
 
     def stop(self, number: int, frame: FrameType | None) -> None:
