@@ -20,8 +20,9 @@ from nlsolve.cli.options import (
     checked_study,
     default_folder,
 )
-from nlsolve.cli.printing import count, print_table, say
+from nlsolve.cli.printing import count, print_endings, print_table, say
 from nlsolve.registry.problems import StudyError, did_you_mean
+from nlsolve.results.parameters import differing_parameters
 from nlsolve.running.packing.pack import export as packed
 from nlsolve.running.store.reading import FolderStatus, read_tables, status_of_folder
 from nlsolve.running.store.upkeep import merge_folders, remove, superfluous
@@ -38,7 +39,7 @@ def table(
     name: Annotated[str | None, typer.Argument(help="one declared table; default: all")] = None,
     as_json: Json = False,
 ) -> None:
-    """Print the declared tables of a results folder, of whatever is finished."""
+    """Print the declared tables of a results folder, or the endings if there are none, of whatever is finished."""
     with ending():
         described, runs = read_tables(folder)
         names = [spec.name for spec in described.tables]
@@ -56,6 +57,9 @@ def table(
         return
     for declared in tables:
         print_table(declared)
+    if not described.tables:
+        shared = [name for name in differing_parameters(runs) if runs[name].notna().all()]
+        print_endings(described.question, runs, shared)
 
 
 @folders.command()

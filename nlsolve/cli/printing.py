@@ -104,7 +104,12 @@ def print_results(results: Results, as_json: bool) -> None:
         print_table(declared)
     if not tables:
         swept = list(dict.fromkeys(name for case in results.study.cases for name in case.swept))
-        print_frame(results.study.question, results.runs.reindex(columns=["case", *swept, "status", "message"]))
+        print_endings(results.study.question, results.runs, swept)
+
+
+def print_endings(question: str, runs: pd.DataFrame, by: list[str]) -> None:
+    """Print how each case ended, with its parameters `by`, on standard output."""
+    print_frame(question, runs.reindex(columns=["case", *by, "status", "message"]))
 
 
 def print_plugins(rows: list[PluginRow]) -> None:

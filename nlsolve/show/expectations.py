@@ -148,7 +148,7 @@ class Finding:
         return (
             f"found, as expected: {self.sentence}"
             if self.holds
-            else (f"not found, though expected: {self.sentence}: {self.refutation}")
+            else (f"not found, though expected: {self.sentence.rstrip('.')}: {self.refutation}")
         )
 
 

@@ -72,6 +72,14 @@ def test_run_without_tables_lists_endings(tmp_path):
     assert "the stopping test was met" in result.stdout
 
 
+def test_table_of_a_study_without_tables_lists_endings_by_what_differs(tmp_path):
+    nlsolve("run", write_study(tmp_path), "--set", "table=[]", "--out", "o")
+    told = nlsolve("table", "o").stdout
+    assert told.count("the stopping test was met") == 4
+    assert "solver.order" in told
+    assert "scene.side" not in told
+
+
 def test_divergence_is_a_result(tmp_path, monkeypatch):
     def march(parts, listen, clock, **way):
         record = fake_march(parts, listen)
@@ -265,7 +273,7 @@ def test_findings_are_judged_and_3_says_that_one_does_not_hold(tmp_path):
     path = write_study(tmp_path, ("\n[quick]", EXPECT), wrong)
     result = nlsolve("run", path)
     assert result.exit_code == 3
-    assert "not found, though expected: Order 20 needs few tangents.: case " in result.stderr
+    assert "not found, though expected: Order 20 needs few tangents: case " in result.stderr
     findings = json.loads(nlsolve("run", path, "--json").stdout)["findings"]
     assert [bool(finding["refutation"]) for finding in findings] == [True, False]
     assert nlsolve("run", path, "--quick").exit_code == 0

@@ -113,7 +113,7 @@ def test_findings_are_sentences():
     plain = Expectation(column="tangents", where={"solver.kind": "anm"}, at_most=4, at_least=1)
     order = Expectation(column="tangents", by="solver.kind", order=("anm", "newton"))
     assert [str(finding) for finding in judged([said, plain, order], [], RUNS)] == [
-        "not found, though expected: Newton factorises most.: case b: tangents is 2, and should be at least 50",
+        "not found, though expected: Newton factorises most: case b: tangents is 2, and should be at least 50",
         "found, as expected: tangents is at most 4.0 and at least 1.0 where solver.kind = anm",
         "found, as expected: tangents is growing along anm, newton",
     ]
