@@ -76,8 +76,12 @@ def status(folder: Folder, as_json: Json = False) -> None:
         typer.echo(f"{folder}: {found.study.question}")
     words = ", ".join(f"{number} {word}" for word, number in found.endings.items())
     finished = sum(found.endings.values())
-    typer.echo(f"{finished} of {count(found.planned)} finished{f' ({words})' if words else ''}")
-    typer.echo(f"{len(found.running)} running, {found.left} left")
+    if found.study is None:
+        told, left = count(finished), ""
+    else:
+        told, left = f"{finished} of {count(found.planned)}", f", {found.left} left"
+    typer.echo(f"{told} finished{f' ({words})' if words else ''}")
+    typer.echo(f"{len(found.running)} running{left}")
     if found.others:
         typer.echo(f"{count(found.others)} more, of other studies, other settings or earlier sources")
     for case, message in found.failures.items():
@@ -94,7 +98,7 @@ def _plain(folder: Path, found: FolderStatus) -> dict[str, object]:
         "endings": dict(found.endings),
         "failures": dict(found.failures),
         "running": list(found.running),
-        "left": found.left,
+        "left": found.left if found.study else None,
         "others": found.others,
     }
 

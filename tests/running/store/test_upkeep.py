@@ -119,7 +119,10 @@ def test_status_is_told_from_parts_and_claims():
     assert "1 case more, of other studies" in text
     claims.release_all()
     Path("out/study.json").unlink()
-    assert "what is left is not known" in told("status", "out")
+    unknown = told("status", "out").splitlines()
+    assert unknown[0].endswith("what is left is not known")
+    assert unknown[1:] == ["3 cases finished (2 converged, 1 crashed)", "0 running"]
+    assert json.loads(told("status", "out", "--json"))["left"] is None
     assert "not a results folder" in told("status", "nowhere", code=2)
 
 
