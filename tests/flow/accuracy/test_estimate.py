@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import pandas as pd
@@ -18,7 +18,7 @@ from nlsolve_scenes.nodes.rings import GradedRings, Rings
 from nlsolve.contracts.scene import Simulation
 from nlsolve.contracts.status import SolveError, Status
 from nlsolve.flow.continuation import Start
-from nlsolve.plugin import Cloud, Discretizer, FlowScene, NodeMotion, Physics, TimeSteps
+from nlsolve.plugin import Cloud, ConstitutiveLaw, Discretizer, FlowScene, NodeMotion, Physics, TimeSteps
 from nlsolve.solving.simulate import run_case
 
 REFERENCE = Path(__file__).parents[2] / "reference"
@@ -93,6 +93,28 @@ def test_the_error_of_the_penalty_is_part_of_the_estimate(penalty: float) -> Non
     assert error > 0.05
     assert row["velocity_error_estimate"] == pytest.approx(error, rel=0.3)
     assert "a solution with more nodes" in row["doubt"]
+
+
+class Holed(StirringTool):
+    """The nodes of a circle at (2.6, 0) mm are missing."""
+
+    kind: Literal["holed"] = "holed"  # type: ignore[assignment]
+    hole: float = 0.8
+
+    def cloud(self, law: ConstitutiveLaw) -> Cloud:
+        whole = super().cloud(law)
+        kept = (np.linalg.norm(whole.nodes - np.array([2.6, 0.0]), axis=1) > self.hole) | whole.on_boundary
+        new = np.cumsum(kept) - 1
+        return Cloud(whole.nodes[kept], {name: new[group] for name, group in whole.boundaries.items()})
+
+
+@pytest.mark.parametrize(("discretizer", "hole"), [(MovingLeastSquares(), 0.5), (TRIANGLES, 0.8), (TRIANGLES, 1.0)])
+def test_a_region_without_nodes_is_seen(discretizer: Discretizer, hole: float) -> None:
+    """Two discretisations of the same nodes would miss the same ones."""
+    scene = Holed(nodes=Rings(spacing=0.25), hole=hole)
+    error, estimate, doubt = measured(setup(scene, 0.3, discretizer=discretizer, error_estimator=TRIANGLES))
+    assert 0.6 * error < estimate < 1.8 * error
+    assert ("a solution with more nodes" in doubt) == (error > 0.035)
 
 
 def test_a_wrong_field_without_another_blemish_is_in_doubt_by_the_estimate() -> None:
