@@ -17,6 +17,7 @@ from nlsolve.running.portions.condition import LEFT
 from nlsolve.running.portions.portion import portion_of
 from nlsolve.running.store.parts import Parts
 from nlsolve.running.store.standing import KEPT, Standings
+from nlsolve.running.ways.ways import led
 from nlsolve.study.case import Case
 from nlsolve.study.study import Study
 
@@ -70,7 +71,9 @@ def plan_of(
     last = {case.id: entry for case in study.cases if (entry := standings.last(case)) is not None}
     known = {case: entry.elapsed for case, entry in last.items() if entry.elapsed == entry.elapsed}
     frame = forecast(study)
-    expected = seconds_expected(study.cases, dict(zip(frame["case"], frame["seconds_all"], strict=True)), known)
+    starts = frame["seconds_start"].where(frame["case"].isin(led(study.cases)), 0.0)
+    predicted = dict(zip(frame["case"], frame["seconds_all"] - starts, strict=True))
+    expected = seconds_expected(study.cases, predicted, known)
     frame["seconds_expected"] = frame["case"].map(expected) * study.timing.rounds
     frame.insert(1, "plan", frame["case"].map(words))
     frame = frame[frame["case"].isin(words)].reset_index(drop=True)

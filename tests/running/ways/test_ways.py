@@ -16,10 +16,11 @@ from nlsolve.contracts.outcome import Outcome
 from nlsolve.contracts.status import Status
 from nlsolve.results.aggregates import shared_ways
 from nlsolve.results.columns import RUNS
+from nlsolve.running.planning.plan import plan_of
 from nlsolve.running.store.identity import way_of
 from nlsolve.running.store.upkeep import superfluous
 from nlsolve.running.ways.files import read_way, way_path, write_way
-from nlsolve.running.ways.ways import Ways
+from nlsolve.running.ways.ways import Ways, led
 from nlsolve.solving.way import Stretch, Way
 from nlsolve.study.study import Study
 
@@ -114,6 +115,14 @@ def test_cases_share_a_way_where_only_their_methods_differ(study: Study) -> None
     assert way_of(Study.from_dict(DOCUMENT, {"start.at": "rest"}).cases[0]) == ""
 
 
+def test_a_plan_counts_the_way_once(study: Study, tmp_path: Path) -> None:
+    assert led(study.cases) == {case.id for case in study.cases[1:]}
+    frame = plan_of(study, tmp_path).cases
+    assert frame["seconds_start"].nunique() == 1
+    first, *others = frame["seconds_expected"]
+    assert all(other == pytest.approx(first - frame["seconds_start"][0]) for other in others)
+
+
 def test_a_way_that_one_case_alone_has_is_not_kept(study: Study, tmp_path: Path) -> None:
     """It is solved in every timing round: perhaps the study compares ways."""
     alone = Ways(study.cases[:1], tmp_path)
@@ -130,7 +139,10 @@ def test_a_way_is_read_as_it_was_written(tmp_path: Path) -> None:
     for one, other in zip(found.stretches, WAY.stretches, strict=True):
         assert (one.start, one.counts, one.seconds) == (other.start, other.counts, other.seconds)
         assert np.array_equal(one.outcome.state, other.outcome.state)
-        told = [vars(replace(each.outcome, state=None, residual_absolute=0.0)) for each in (one, other)]
+        told = [
+            vars(replace(each.outcome, state=None, residual_absolute=0.0, newton_correction=0.0))
+            for each in (one, other)
+        ]
         assert told[0] == told[1]
 
 
