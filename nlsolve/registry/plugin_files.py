@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import hashlib
-import importlib.util
 import re
 import sys
 from collections.abc import Iterable
+from importlib.machinery import SOURCE_SUFFIXES
 from pathlib import Path
 from types import ModuleType
 
 from nlsolve.contracts.component import Component
 from nlsolve.registry import hookspecs
+from nlsolve.registry.probing import fault_of_file, module_of_file, undisturbed
 from nlsolve.registry.problems import StudyError
 from nlsolve.registry.registry import CONTRACTS, Registry, sentence_of
 
@@ -47,17 +48,17 @@ def load_file(path: Path) -> ModuleType:
     name = f"nlsolve_file_{re.sub(r'[^0-9A-Za-z]', '_', path.stem)}_{digest}"
     if name in sys.modules:
         return sys.modules[name]
-    spec = importlib.util.spec_from_file_location(name, path.resolve())
-    if spec is None or spec.loader is None:
+    if path.suffix not in SOURCE_SUFFIXES:
         raise StudyError(f"the plugin {path} is no Python file: its name should end with .py")
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[name] = module
+    file = path.resolve()
+    fault = fault_of_file(file)
+    if fault:
+        raise StudyError(f"the plugin {path} cannot be imported: {fault}")
     try:
-        spec.loader.exec_module(module)
+        with undisturbed():
+            return module_of_file(name, file)
     except (Exception, SystemExit) as error:  # a stranger's file may raise anything
-        del sys.modules[name]
         raise StudyError(f"the plugin {path} cannot be imported: {sentence_of(error)}") from error
-    return module
 
 
 def _offered_by(module: ModuleType) -> list[type[Component]]:

@@ -15,7 +15,10 @@ from contextlib import contextmanager, redirect_stdout, suppress
 from functools import cache
 from importlib import import_module
 from importlib.metadata import EntryPoint
+from importlib.util import module_from_spec, spec_from_file_location
+from pathlib import Path
 from selectors import EVENT_READ, DefaultSelector
+from types import ModuleType
 
 IMPORT_SECONDS = 20.0
 """Time in which a plugin must be imported [s]."""
@@ -36,6 +39,9 @@ PROGRAM = (
     "from nlsolve.registry.probing import import_all; import_all(argument['entries'], argument['report'])"
 )
 
+FILE = "file"
+"""Stands in place of the group of entry points for a plugin of one file: its name is a module's, its value a path."""
+
 _found: dict[str, str] = {}
 _now = time.monotonic
 _exit = os._exit
@@ -51,6 +57,33 @@ def faults_of(entries: Sequence[EntryPoint]) -> Mapping[str, str]:
         known: dict[str, str] = json.loads(told)
         return known
     return _probed(tuple((entry.name, entry.value, entry.group) for entry in entries))
+
+
+def fault_of_file(path: Path) -> str:
+    """Why a plugin of one file must not be imported, as `faults_of`; empty where nothing speaks against it.
+
+    It is not tried in a process that has been started for cases: the process that has started it has done so.
+    """
+    if os.environ.get(KNOWN_FAULTS) is not None or os.name != "posix":
+        return ""
+    done, reason = _imported([("nlsolve_file", str(path), FILE)])
+    if not done:
+        return reason
+    return f"it raises {done[0]}" if done[0] else ""
+
+
+def module_of_file(name: str, path: Path) -> ModuleType:
+    """Import a file of Python as the module `name`. Raises whatever the file raises, and leaves no module then."""
+    spec = spec_from_file_location(name, path)
+    if spec is None or spec.loader is None:
+        raise ImportError("it is no Python file")
+    module = sys.modules[name] = module_from_spec(spec)
+    try:
+        spec.loader.exec_module(module)
+    except BaseException:
+        del sys.modules[name]
+        raise
+    return module
 
 
 def environment_of_faults() -> dict[str, str]:
@@ -73,10 +106,13 @@ def undisturbed() -> Iterator[None]:
 def import_all(entries: Sequence[Sequence[str]], report: int) -> None:
     """Import plugins, and write a line to the descriptor `report` before and after each; of the second process."""
     import_module("nlsolve.plugin")
-    for number, entry in enumerate(entries):
+    for number, (name, value, group) in enumerate(entries):
         os.write(report, f"{number}\n".encode())
         try:
-            EntryPoint(*entry).load()
+            if group == FILE:
+                module_of_file(name, Path(value))
+            else:
+                EntryPoint(name, value, group).load()
         except (SystemExit, KeyboardInterrupt) as error:
             os.write(report, f"{type(error).__name__}: {error}".rstrip(": ").encode() + b"\n")
         except Exception:  # is met again, and told, where the plugin is imported to be used

@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 from fakes import Newton, registry_of
 
+from nlsolve.registry import probing
 from nlsolve.registry.plugin_files import load_file, with_files
 from nlsolve.registry.problems import StudyError
 from nlsolve.registry.registry import DISABLE, Registry, installed_plugins, load_registry
@@ -101,13 +102,18 @@ def test_objects_of_its_classes_can_be_sent(tmp_path):
         ("", "empty.py", "cannot be registered: TypeError: it defines no component class with a kind"),
         ("import nothing_of_this_name", "a.py", "cannot be imported: ModuleNotFoundError: No module named 'nothing_"),
         ("def f(:", "b.py", "cannot be imported: SyntaxError: invalid syntax"),
-        ("import sys\nsys.exit(0)", "c.py", "cannot be imported: SystemExit: 0"),
+        ("import sys\nsys.exit(0)", "c.py", "cannot be imported: it raises SystemExit: 0"),
+        ("raise KeyboardInterrupt", "f.py", "cannot be imported: it raises KeyboardInterrupt"),
+        ("import os\nos._exit(0)", "g.py", "cannot be imported: it ends the interpreter with exit code 0"),
+        ("import ctypes\nctypes.string_at(0)", "h.py", "cannot be imported: it ends the interpreter with SIGSEGV"),
+        ("while True: pass", "i.py", "cannot be imported: it takes more than 1 s"),
         (HALF, "solver.txt", "is no Python file: its name should end with .py"),
         (HALF.replace('"half"', '"a:b"'), "d.py", "TypeError: Half has the kind 'a:b'"),
         (HALF + "\n\ndef nlsolve_components():\n    raise OSError('no licence')\n", "e.py", "OSError: no licence"),
     ],
 )
-def test_a_file_that_cannot_be_used(tmp_path, text, name, sentence):
+def test_a_file_that_cannot_be_used(tmp_path, monkeypatch, text, name, sentence):
+    monkeypatch.setattr(probing, "IMPORT_SECONDS", 1.0)
     path = tmp_path / name if text is None else written(tmp_path, text, name)
     with pytest.raises(StudyError) as caught:
         with_files(Registry(), [path])
@@ -134,3 +140,15 @@ def test_a_disabled_plugin_is_not_imported(monkeypatch, name, left):
     complaint = registry.complaint("scene", "bratu")
     assert complaint is not None
     assert complaint.endswith(f"; {len(disabled)} plugin(s) disabled")
+
+
+def test_what_a_file_prints_is_no_data(tmp_path, capfd):
+    with_files(Registry(), [written(tmp_path, HALF + "\nprint('hello')\n")])
+    told = capfd.readouterr()
+    assert (told.out, told.err) == ("", "hello\n")
+
+
+def test_a_process_that_runs_cases_does_not_try_a_file_again(tmp_path, monkeypatch):
+    monkeypatch.setattr(probing, "_imported", lambda entries: pytest.fail("tried"))
+    monkeypatch.setenv(probing.KNOWN_FAULTS, "{}")
+    assert "half" in with_files(Registry(), [written(tmp_path, HALF + "# another text\n")]).classes("solver")
