@@ -293,12 +293,18 @@ def test_a_jacobian_of_the_wrong_shape_is_refused_where_it_is_asked_for():
 
 def test_what_a_function_raises_is_its_own():
     def formula(u: Any) -> Any:
-        raise ZeroDivisionError("mine")
+        raise RuntimeError("mine")
 
-    with pytest.raises(ZeroDivisionError, match="mine"):
+    with pytest.raises(RuntimeError, match="mine"):
         nlsolve.solve(formula, START)
     with pytest.raises(ZeroDivisionError, match="by a method"):
         nlsolve.solve(powell, START, Broken())
+
+
+def test_a_division_by_zero_in_a_function_is_a_status():
+    outcome = nlsolve.solve(lambda u: [1.0 / float(u[0] - START[0]), *u[1:]], START, "broyden")
+    assert not outcome.converged
+    assert "division by zero" in outcome.message
 
 
 # Several methods.
