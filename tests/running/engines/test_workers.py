@@ -36,7 +36,7 @@ ENDINGS = {
     "loops": ("timed out", None, r"limits.seconds = 5 at FILE:\d+ \(solver 'loops'\)"),
     "deaf": ("timed out", None, r"limits.seconds = 5 at "),
     "stuck": ("timed out", None, r"limits.seconds = 5 at FILE:\d+ \(solver 'stuck'\)"),
-    "yields-forever": ("stagnated", None, "the residual stopped falling"),
+    "yields-forever": ("budget spent", None, "the iterations allowed were used up"),
     "leaks": ("out of memory", None, r"at FILE:\d+ \(solver 'leaks'\)"),
     "asks-for-too-much": ("out of memory", None, r"MemoryError: Unable to allocate 72\.8 TiB"),
     "exits": ("crashed", "exit code 3", r"ended with exit code 3 at FILE:\d+ \(solver 'exits'\)"),
