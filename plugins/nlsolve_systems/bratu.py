@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import Any, Literal
 
 import numpy as np
+import scipy
 from pydantic import Field
-from scipy.interpolate import CubicSpline
 from scipy.linalg import solve_banded
 
 from nlsolve.plugin import System
@@ -67,7 +67,7 @@ class Bratu(System):
         become small.
         """
         ends = np.linspace(0.0, 1.0, SHOT + 2)
-        u = CubicSpline(ends, [0.0, *coarse, 0.0])(places(self.nodes)).astype(np.longdouble)
+        u = scipy.interpolate.CubicSpline(ends, [0.0, *coarse, 0.0])(places(self.nodes)).astype(np.longdouble)
         square = np.longdouble(self.nodes + 1) ** 2
         bands = np.full((3, self.nodes), -float(square))
         for _ in range(REFINEMENTS):

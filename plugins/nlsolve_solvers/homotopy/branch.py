@@ -34,7 +34,11 @@ class Branch:
 
     @property
     def contraction(self) -> float:
-        """(‖r_p‖/‖r_1‖)^(1/(p−1)): what an order leaves of the residual, in the mean; r_{j+1} is left by W_1 … W_j."""
+        """(‖r_p‖/‖r_1‖)^(1/(p−1)): what an order leaves of the residual, in the mean; r_{j+1} is left by W_1 … W_j.
+        1 for one order, of which nothing is known.
+        """
+        if self.order == 1:
+            return 1.0
         first = self.residual
         return float((norm(self.rhs[-1]) / first) ** (1.0 / (self.order - 1))) if first else 0.0
 
