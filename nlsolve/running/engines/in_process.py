@@ -9,6 +9,7 @@ from nlsolve.results.costs.lanes import ALONE
 from nlsolve.results.frames import Part
 from nlsolve.running.engines.engine import SECONDS_BETWEEN_LOOKS, Engine, Listener, Turn, Turns
 from nlsolve.running.engines.execution import Debugger, execute
+from nlsolve.solving.simulate import Progress
 from nlsolve.study.timing import Timing
 
 
@@ -35,5 +36,8 @@ class InProcess(Engine):
 def run_here(turn: Turn, timing: Timing, tell: Listener, lane: str, debugger: Debugger | None = None) -> Part:
     """The part of a turn, run in this process."""
     case = turn.case
-    listen = lambda progress: tell(turn.event(progress))  # noqa: E731
+
+    def listen(progress: Progress) -> None:
+        tell(turn.event(progress))
+
     return execute(case.id, case.parameters, case.parts, timing, listen, lane, debugger, turn.way, turn.share)
