@@ -242,6 +242,10 @@ RUNS = _by_name(
         "share of the change of V between neighbouring inner nodes that its gradients do not explain",
     ),
     Column(
+        "audit.hole",
+        "radius of the largest circle in the flow without a node, over the spacing of the nodes around it",
+    ),
+    Column(
         "audit.heating", "largest adiabatic heating S:ε̇/(ρ c_p) over the time reached, or a time 2π/reference rate", "K"
     ),
     Column(

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any, Literal
 
 import numpy as np
+import scipy.sparse.linalg
 from scipy.linalg.lapack import dgecon, dgetrf, dgetrs
 
 from nlsolve.plugin import Factors, LinearSolver, SolveError, Status
@@ -13,31 +14,53 @@ LARGEST = 20_000  # unknowns: above it the factors take more than 3 GB, and spar
 
 
 class DenseFactors(Factors):
-    """L and U of one matrix of U unknowns, U² entries."""
+    """L and U of R A C for one matrix A of U unknowns, U² entries.
+
+    R and C are diagonal, of powers of two that make the largest entry of each row and column about 1. So neither the
+    pivots nor whether A counts as singular depends on the units of equations and unknowns, and nothing is rounded.
+    """
 
     ordering = "dense"
 
     def __init__(self, matrix: np.ndarray) -> None:
+        self._norm = float(np.abs(matrix).sum(axis=0).max())
+        self._rows = powers_of_two(np.abs(matrix).max(axis=1))
+        matrix *= self._rows[:, None]
+        self._columns = powers_of_two(np.abs(matrix).max(axis=0))
+        matrix *= self._columns
         norm = float(np.abs(matrix).sum(axis=0).max())
         lu, pivots, info = dgetrf(matrix, overwrite_a=True)
         if info > 0:
             raise SolveError(Status.SINGULAR_TANGENT, f"LAPACK: pivot {info} of {len(lu)} is exactly zero")
         self._factors = lu, pivots
-        self._reciprocal, _ = dgecon(lu, norm)
-        if not self._reciprocal > np.finfo(float).eps:
-            raise SolveError(
-                Status.SINGULAR_TANGENT, f"LAPACK: the reciprocal condition number is {self._reciprocal:.1e}"
-            )
+        reciprocal, _ = dgecon(lu, norm)
+        if not reciprocal > np.finfo(float).eps:
+            raise SolveError(Status.SINGULAR_TANGENT, f"LAPACK: the reciprocal condition number is {reciprocal:.1e}")
         self.fill = lu.size
 
     def solve(self, rhs: np.ndarray) -> np.ndarray:
         """x with A x = rhs by one pair of triangular solves."""
-        x, _ = dgetrs(*self._factors, rhs)  # an eighth of what scipy.linalg.lu_solve takes for 20 unknowns
-        return x
+        return self._solved(rhs)
 
     def condition(self) -> float:
-        """An estimate of ‖A‖₁ ‖A⁻¹‖₁ from the factors (Higham 1988)."""
-        return 1.0 / float(self._reciprocal)
+        """‖A‖₁ times an estimate of ‖A⁻¹‖₁ from the factors (Hager 1984)."""
+        inverse = scipy.sparse.linalg.LinearOperator(
+            self._factors[0].shape,
+            matvec=lambda rhs: self._solved(rhs.ravel()),
+            rmatvec=lambda rhs: self._solved(rhs.ravel(), transposed=True),
+        )
+        return self._norm * float(scipy.sparse.linalg.onenormest(inverse, t=1))
+
+    def _solved(self, rhs: np.ndarray, transposed: bool = False) -> np.ndarray:
+        """A⁻¹ rhs, or A⁻ᵀ rhs."""
+        first, last = (self._columns, self._rows) if transposed else (self._rows, self._columns)
+        x, _ = dgetrs(*self._factors, (first * rhs.T).T, trans=int(transposed))  # an eighth of lu_solve's time for 20
+        return (last * x.T).T
+
+
+def powers_of_two(sizes: np.ndarray) -> np.ndarray:
+    """The power of two, (U,), that makes each size (U,) between 1/2 and 1; 1 for zero."""
+    return np.where(sizes > 0.0, np.ldexp(1.0, -np.frexp(sizes)[1]), 1.0)
 
 
 class Lapack(LinearSolver):

@@ -28,10 +28,14 @@ class Enriched:
 
 def inner_edges(cloud: Cloud) -> Indices:
     """The edges of the Delaunay triangulation with a node inside, (E, 2). Across a hole both ends are at its wall."""
-    corners = scipy.spatial.Delaunay(cloud.nodes).simplices
-    sides = np.concatenate([corners[:, [0, 1]], corners[:, [1, 2]], corners[:, [2, 0]]])
-    edges = np.unique(np.sort(sides, axis=1), axis=0)
+    edges = edges_of(scipy.spatial.Delaunay(cloud.nodes).simplices)
     return edges[~cloud.on_boundary[edges].all(axis=1)]
+
+
+def edges_of(corners: Indices) -> Indices:
+    """The edges (E, 2) of triangles with these corners (T, 3), each once."""
+    sides = np.concatenate([corners[:, [0, 1]], corners[:, [1, 2]], corners[:, [2, 0]]])
+    return np.unique(np.sort(sides, axis=1), axis=0)
 
 
 def enriched(cloud: Cloud, edges: Indices) -> Enriched:

@@ -98,6 +98,17 @@ class TestEveryone:
         assert estimate is not None
         assert exact / 10 <= estimate <= exact * (1 + 1e-6)
 
+    @pytest.mark.parametrize("linear", [Lapack(), SuperLU(), pytest.param(Rslab(), marks=needs_rslab)], ids=str)
+    @pytest.mark.parametrize("seed", range(3))
+    def test_equations_and_unknowns_may_have_any_unit(self, linear: LinearSolver, seed: int) -> None:
+        """A matrix is not singular because its rows and columns have sizes of their own."""
+        random = np.random.default_rng(seed)
+        matrix = random.standard_normal((12, 12)) + 4.0 * np.eye(12)
+        rows, columns = 2.0 ** random.integers(-60, 61, (2, 12))
+        solution = random.standard_normal(12)
+        factors = linear.factorize(sp.csr_array(rows[:, None] * matrix * columns))
+        np.testing.assert_allclose(columns * factors.solve(rows * (matrix @ solution)), solution, rtol=1e-9)
+
     def test_an_iteration_estimates_no_condition(self) -> None:
         assert IluGmres().factorize(tangent()).condition() is None
 
