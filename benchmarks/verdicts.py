@@ -42,7 +42,7 @@ RIGHT, EXACT = 1e-2, 1e-9
 FACTORS = (1.0, 10.0, 100.0)
 MULTIPLICITY = 4.0  # of the roots with a singular Jacobian in the published sets, at most
 POLISHING = 60
-VANISHED = 1e-12  # part of max |F_i| at the published start that a root may have left
+VANISHED = 1e-9  # part of max |F_i| at the published start that a root may have left
 
 SYSTEMS: tuple[System, ...] = (
     *(Published(problem=name) for name in PROBLEMS),

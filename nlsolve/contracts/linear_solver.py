@@ -53,3 +53,7 @@ class LinearSolver(Component, ABC):
         Raises SolveError: singular tangent when the matrix is singular to working precision, non-finite when an entry
         is not a finite number.
         """
+
+    def for_one_matrix(self) -> LinearSolver:
+        """The same solver for a matrix that is factorised once, without trials that only later ones would repay."""
+        return self

@@ -74,6 +74,10 @@ class SuperLU(LinearSolver):
         "auto", description="column ordering; auto tries three on the first matrix and keeps the sparsest factors"
     )
 
+    def for_one_matrix(self) -> SuperLU:
+        """With the ordering for nearly symmetric patterns, which those of flows are, where it would be tried for."""
+        return self.model_copy(update={"ordering": "mmd-at-plus-a"}) if self.ordering == "auto" else self
+
     def factorize(self, matrix: Any, previous: Factors | None = None) -> SuperLUFactors:
         """Factors of a sparse matrix. With `previous` the ordering chosen there is kept, and with it the order of the
         columns as long as the pattern is the same.

@@ -9,7 +9,8 @@ The pressure that the penalty has built up is given to both beside the penalty, 
 compressibility is a small part of what it was: V* − V has the error of the penalty in it too (a step of Uzawa 1958;
 Fortin & Glowinski 1983).
 
-Newton's steps end when one is small beside the way gone. Nothing of this is counted or timed.
+Newton's steps, all with the factors of the first tangent (`kept_factors`), end when one is small beside the way gone.
+Nothing of this is counted or timed.
 """
 
 from __future__ import annotations
@@ -21,6 +22,7 @@ import numpy as np
 from nlsolve.contracts.continuum.discretizer import Discretizer
 from nlsolve.contracts.status import SolveError, Status
 from nlsolve.flow.accuracy.enrichment import Enriched, enriched, inner_edges
+from nlsolve.flow.accuracy.kept_factors import KeptFactors
 from nlsolve.flow.momentum import Flow
 from nlsolve.flow.state import FlowState
 from nlsolve.series import Array
@@ -69,7 +71,8 @@ def _solution(
 
 def _solved(flow: Flow, start: Array, state: FlowState) -> Array:
     """R(u) = 0 from `start` (U,), to the accuracy that an estimate needs. Raises SolveError."""
-    problem, tangent = CountedProblem(flow, Ledger()), Tangent(state.parts.linear, None, Ledger())
+    linear = KeptFactors(linear=state.parts.linear.for_one_matrix())
+    problem, tangent = CountedProblem(flow, Ledger()), Tangent(linear, None, Ledger())
     last, forces = start, np.linalg.norm(flow.residual(start))
     if forces <= SOLVED * flow.scale(start):
         return start

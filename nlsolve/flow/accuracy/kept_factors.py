@@ -1,0 +1,64 @@
+"""A x = b by GMRES over Krylov spaces of A K⁻¹, with the factors K of an earlier matrix."""
+
+from __future__ import annotations
+
+from typing import Any, Literal
+
+import numpy as np
+import scipy
+
+from nlsolve.contracts.linear_solver import Factors, LinearSolver
+from nlsolve.series import Array
+
+ACCURATE = 1e-2
+"""‖b − A x‖/‖b‖ that GMRES is asked for."""
+
+POOR = 0.1
+"""What is left by it above which A is factorised."""
+
+DIMENSION = 20
+"""Largest dimension of the Krylov space."""
+
+
+class KeptFactors(LinearSolver):
+    """Factorises the first matrix of a solve, and a later one only where GMRES fails with the factors so far.
+
+    For a few Newton steps that need not be exact, on a matrix too large to be factorised at each (Saad & Schultz 1986,
+    preconditioned on the right, so that what GMRES tests is the true residual).
+    """
+
+    kind: Literal["kept-factors"] = "kept-factors"
+    linear: Any
+
+    def factorize(self, matrix: Any, previous: Factors | None = None) -> Preconditioned:
+        """The matrix with its own factors, or with those that `previous` has."""
+        earlier = previous if isinstance(previous, Preconditioned) else None
+        return Preconditioned(matrix, self.linear, None if earlier is None else earlier.factors)
+
+
+class Preconditioned(Factors):
+    """A matrix (U, U), and the factors of it or of an earlier one.
+
+    factors : those that precondition the next solve.
+    """
+
+    def __init__(self, matrix: Any, linear: LinearSolver, earlier: Factors | None) -> None:
+        self._matrix, self._linear = matrix, linear
+        self._own = earlier is None
+        self.factors = linear.factorize(matrix) if earlier is None else earlier
+
+    def solve(self, rhs: Array) -> Array:
+        """x with A x = rhs to `ACCURATE`, exactly where A has been factorised. Raises what the factorisation raises."""
+        if not self._own:
+            x = self._by_gmres(rhs)
+            if np.linalg.norm(rhs - self._matrix @ x) <= POOR * np.linalg.norm(rhs):
+                return x
+            self.factors, self._own = self._linear.factorize(self._matrix, self.factors), True
+        return self.factors.solve(rhs)
+
+    def _by_gmres(self, rhs: Array) -> Array:
+        product = scipy.sparse.linalg.LinearOperator(
+            self._matrix.shape, matvec=lambda v: self._matrix @ self.factors.solve(v), dtype=float
+        )
+        found, _ = scipy.sparse.linalg.gmres(product, rhs, rtol=ACCURATE, restart=DIMENSION, maxiter=1)
+        return self.factors.solve(found)
