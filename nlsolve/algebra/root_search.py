@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from nlsolve.algebra.measure import ALLOWED, NEAR, SLOWEST, SUPERLINEAR, ByEquation, Correction
+from nlsolve.algebra.by_equation import ALLOWED, NEAR, SLOWEST, SUPERLINEAR, ByEquation, Correction
 from nlsolve.contracts.linear_solver import LinearSolver
 from nlsolve.contracts.outcome import Outcome
 from nlsolve.contracts.problem import NonlinearProblem

@@ -23,7 +23,7 @@ class Outcome:
     detail : a sentence on this ending; the sentence of the status when there is no more to say.
     state : u, shape (U,), the last state that the method reached.
     residual_norm : the relative residual, which the driver computes: ‖R(u)‖₂ over the problem's scale, or |F_i| over
-        what cancels in equation i, largest over the equations (`nlsolve.algebra.measure`).
+        what cancels in equation i, largest over the equations (`nlsolve.algebra.by_equation`).
     residual_absolute : ‖R(u)‖₂ in the unit of the problem; NaN when nothing was solved.
     rows : one dictionary for each step, in order; `steps` gives them as a frame.
     claimed_wrongly : True when the method, or a stopping test other than that of residuals, accepted a state whose

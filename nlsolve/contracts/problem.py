@@ -172,7 +172,7 @@ class NonlinearProblem(ABC):
     def scale(self, u: Array) -> float:
         """The size that ‖R(u)‖₂ is divided by to judge it, for a problem that knows the size of what cancels in R.
 
-        A problem that does not define it is judged equation by equation, by its Jacobian (`nlsolve.algebra.measure`).
+        A problem that does not define it is judged equation by equation, by J (`nlsolve.algebra.by_equation`).
         """
         return 1.0
 

@@ -8,7 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from nlsolve.algebra.measure import measure_of
+from nlsolve.algebra.by_equation import ByEquation
+from nlsolve.algebra.measure import ByScale, Measure
+from nlsolve.contracts.linear_solver import LinearSolver
 from nlsolve.contracts.nonlinear_solver import NonlinearSolver
 from nlsolve.contracts.outcome import Outcome
 from nlsolve.contracts.problem import NonlinearProblem, norm
@@ -42,7 +44,7 @@ def solve(
     """
     counted = CountedProblem(problem, ledger, tangent.operator)
     begun, renewals, withheld = ledger.copy(), tangent.renewals, tangent.withheld
-    measure = measure_of(problem, start, counted.first_residual(start), tangent.linear)
+    measure = _measure_of(problem, start, counted.first_residual(start), tangent.linear)
     counted.judged_by(measure, start)
     before, rows = start, list[dict[str, Any]]()
     residual_norm = size = np.inf
@@ -145,3 +147,11 @@ def solve(
         if since_best >= PATIENCE:
             return ended(Status.STAGNATED)
     return ended(Status.BUDGET_SPENT)
+
+
+def _measure_of(problem: NonlinearProblem, start: Array, residual: Array, linear: LinearSolver) -> Measure:
+    """The measure of a solve from `start` (U,), where R = `residual` (U,).
+
+    linear : solves the linear systems of corrections, off the clock.
+    """
+    return ByScale(problem, problem.scale(start)) if problem.has_scale else ByEquation(problem, start, residual, linear)

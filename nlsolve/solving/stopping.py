@@ -21,7 +21,7 @@ class StoppingTest(Component):
     residual : the relative residual is at most the tolerance, evaluated by the driver and not timed. The fair test. For
         a flow it is ‖R(u)‖₂ over the size of the forces that cancel in it; for any other problem it is |F_i| over the
         size of what cancels in equation i, largest over all equations, and the Newton correction, which must be as
-        small beside each unknown (`nlsolve.algebra.measure`): neither depends on units.
+        small beside each unknown (`nlsolve.algebra.by_equation`): neither depends on units.
     absolute : ‖R(u)‖ ≤ tolerance in the named norm and in the problem's own unit, as published counts have it.
     difference : ‖u_i − u_{i−1}‖ / ‖u_i‖ ≤ tolerance in the named norm, the test of iterative "Algo2" in the 2015 paper.
     claim : the method reports a solution (a_max ≥ 1 for a series, with its own η), as for "Algo1" in the 2015 paper.

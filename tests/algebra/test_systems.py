@@ -20,8 +20,8 @@ from pydantic import Field
 from typer.testing import CliRunner
 
 import nlsolve
+from nlsolve.algebra.by_equation import ByEquation
 from nlsolve.algebra.colouring import Colouring, groups_of
-from nlsolve.algebra.measure import ByEquation
 from nlsolve.algebra.root_search import newton_steps, root_error
 from nlsolve.cli.app import app
 from nlsolve.contracts.status import Status
