@@ -21,7 +21,7 @@ import numpy as np
 
 from nlsolve.contracts.continuum.discretizer import Discretizer
 from nlsolve.contracts.status import SolveError, Status
-from nlsolve.flow.accuracy.enrichment import Enriched, enriched, inner_edges
+from nlsolve.flow.accuracy.enrichment import Enriched, enriched, twice_as_fine
 from nlsolve.flow.accuracy.kept_factors import KeptFactors
 from nlsolve.flow.momentum import Flow
 from nlsolve.flow.state import FlowState
@@ -53,7 +53,7 @@ def error_estimate(state: FlowState, velocity: Array, before: Array | None) -> f
     if estimator is None:
         return float("nan")
     nothing = np.empty((0, 2), dtype=int)
-    fine = _solution(state, enriched(state.cloud, inner_edges(state.cloud)), estimator, velocity, before)
+    fine = _solution(state, twice_as_fine(state.cloud), estimator, velocity, before)
     coarse = _solution(state, enriched(state.cloud, nothing), estimator, velocity, before)
     best = fine[: len(velocity)] + RICHARDSON * (fine[: len(velocity)] - coarse)
     return float(np.linalg.norm((best - velocity)[inside]) / np.linalg.norm(velocity[inside]))
