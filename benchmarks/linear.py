@@ -37,6 +37,7 @@ LINEARS: dict[str, dict[str, Any]] = {
     "superlu, mmd-ata": {"kind": "superlu", "ordering": "mmd-ata"},
     "rslab": {"kind": "rslab"},
     "rslab, never symmetric": {"kind": "rslab", "symmetric": "never"},
+    "pardiso": {"kind": "pardiso"},
     "ilu-gmres": {"kind": "ilu-gmres"},
     "lapack": {"kind": "lapack"},
 }

@@ -1,4 +1,4 @@
-"""Factorisations of sparse matrices: SuperLU, LAPACK, rslab, and GMRES behind an incomplete LU."""
+"""Factorisations of sparse matrices: SuperLU, LAPACK, rslab, PARDISO, and GMRES behind an incomplete LU."""
 
 from __future__ import annotations
 
@@ -7,10 +7,11 @@ from collections.abc import Iterable
 from nlsolve.plugin import Component, hookimpl
 from nlsolve_linear.ilu_gmres import IluGmres
 from nlsolve_linear.lapack import Lapack
+from nlsolve_linear.pardiso import Pardiso
 from nlsolve_linear.rslab import Rslab
 from nlsolve_linear.superlu import SuperLU
 
 
 @hookimpl
 def nlsolve_components() -> Iterable[type[Component]]:
-    return [SuperLU, Lapack, Rslab, IluGmres]
+    return [SuperLU, Lapack, Rslab, Pardiso, IluGmres]

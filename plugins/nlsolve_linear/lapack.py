@@ -9,6 +9,7 @@ import scipy.sparse.linalg
 from scipy.linalg.lapack import dgecon, dgetrf, dgetrs
 
 from nlsolve.plugin import Factors, LinearSolver, SolveError, Status
+from nlsolve_linear.equilibrium import powers_of_two
 
 LARGEST = 20_000  # unknowns: above it the factors take more than 3 GB, and sparse ones a fraction of that
 
@@ -56,11 +57,6 @@ class DenseFactors(Factors):
         first, last = (self._columns, self._rows) if transposed else (self._rows, self._columns)
         x, _ = dgetrs(*self._factors, (first * rhs.T).T, trans=int(transposed))  # an eighth of lu_solve's time for 20
         return (last * x.T).T
-
-
-def powers_of_two(sizes: np.ndarray) -> np.ndarray:
-    """The power of two, (U,), that makes each size (U,) between 1/2 and 1; 1 for zero."""
-    return np.where(sizes > 0.0, np.ldexp(1.0, -np.frexp(sizes)[1]), 1.0)
 
 
 class Lapack(LinearSolver):

@@ -13,6 +13,7 @@ import scipy.sparse.linalg
 from pydantic import Field
 
 from nlsolve.plugin import Factors, LinearSolver, SolveError, Status
+from nlsolve_linear.equilibrium import is_symmetric
 
 try:
     import rslab
@@ -21,7 +22,6 @@ except ImportError:  # an extra: nlsolve[rslab]
 else:
     rslab.set_log_level("error")  # of a singular matrix it warns on standard error, and raises as well
 
-ASYMMETRY = 1e-12  # largest |A − Aᵀ| over largest |A| of a matrix that counts as symmetric
 ABSENT = "needs the library rslab: pip install 'nlsolve[rslab]'"
 
 
@@ -58,16 +58,6 @@ class RslabFactors(Factors):
             rmatvec=lambda rhs: self._factors.solve_transpose(np.ascontiguousarray(rhs.ravel())),
         )
         return self._norm * float(scipy.sparse.linalg.onenormest(inverse, t=1))
-
-
-def is_symmetric(columns: Any) -> bool:
-    """Whether the sorted compressed columns are, to 1e-12 of the largest entry, those of the transposed matrix."""
-    rows = columns.tocsr()
-    return (
-        np.array_equal(rows.indptr, columns.indptr)
-        and np.array_equal(rows.indices, columns.indices)
-        and bool(np.abs(rows.data - columns.data).max() <= ASYMMETRY * np.abs(columns.data).max())
-    )
 
 
 class Rslab(LinearSolver):

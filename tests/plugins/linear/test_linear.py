@@ -15,9 +15,12 @@ import scipy.sparse as sp
 import scipy.sparse.linalg
 from cases import near, run, spin_flow
 from fakes import registry_of
+from nlsolve_linear import pardiso as nlsolve_pardiso
 from nlsolve_linear import rslab as nlsolve_rslab
+from nlsolve_linear.equilibrium import equilibrated, is_symmetric
 from nlsolve_linear.ilu_gmres import IluGmres
 from nlsolve_linear.lapack import LARGEST, Lapack
+from nlsolve_linear.pardiso import Pardiso
 from nlsolve_linear.rslab import Rslab
 from nlsolve_linear.superlu import SuperLU
 from nlsolve_rules.refresh import EveryIteration, Never
@@ -35,6 +38,9 @@ from nlsolve.testing.toy_problem import ToyProblem
 needs_rslab = pytest.mark.skipif(
     nlsolve_rslab.rslab is None, reason="rslab is not installed: pip install 'nlsolve[rslab]'"
 )
+needs_pardiso = pytest.mark.skipif(
+    nlsolve_pardiso.mkl is None, reason="PARDISO is not installed: pip install 'nlsolve[pardiso]'"
+)
 LINEARS: list[Any] = [
     Lapack(),
     Lapack(refinement=1),
@@ -42,6 +48,8 @@ LINEARS: list[Any] = [
     IluGmres(drop_tolerance=0.0, refinement=1),
     pytest.param(Rslab(), marks=needs_rslab),
     pytest.param(Rslab(symmetric="never", refinement=1), marks=needs_rslab),
+    pytest.param(Pardiso(), marks=needs_pardiso),
+    pytest.param(Pardiso(symmetric="never", refinement=1), marks=needs_pardiso),
 ]
 START = ToyProblem.solution + 0.5 * np.cos(np.arange(12.0))
 
@@ -98,7 +106,16 @@ class TestEveryone:
         assert estimate is not None
         assert exact / 10 <= estimate <= exact * (1 + 1e-6)
 
-    @pytest.mark.parametrize("linear", [Lapack(), SuperLU(), pytest.param(Rslab(), marks=needs_rslab)], ids=str)
+    @pytest.mark.parametrize(
+        "linear",
+        [
+            Lapack(),
+            SuperLU(),
+            pytest.param(Rslab(), marks=needs_rslab),
+            pytest.param(Pardiso(), marks=needs_pardiso),
+        ],
+        ids=str,
+    )
     @pytest.mark.parametrize("seed", range(3))
     def test_equations_and_unknowns_may_have_any_unit(self, linear: LinearSolver, seed: int) -> None:
         """A matrix is not singular because its rows and columns have sizes of their own."""
@@ -397,3 +414,59 @@ def test_a_loose_linear_solver_is_answered_for_by_the_outside_test() -> None:
     assert loose.status is tight.status is Status.CONVERGED
     assert len(loose.rows) >= len(tight.rows)
     assert loose.residual_norm <= 1e-9 * flow.scale(near(flow, 0.7))
+
+
+@needs_pardiso
+class TestPardiso:
+    def test_a_conservative_tangent_has_half_the_entries(self) -> None:
+        symmetric, general = (
+            Pardiso(symmetric=kind).factorize(tangent("conservative")) for kind in ("detect", "never")
+        )
+        assert (symmetric.ordering, general.ordering) == ("metis, ldlt", "metis, lu")
+        assert symmetric.fill < 0.7 * general.fill
+
+    @pytest.mark.parametrize("symmetric", [True, False])
+    def test_a_matrix_without_a_null_vector_of_its_own_is_refused(self, symmetric: bool) -> None:
+        """A Laplacian without a wall: each row adds up to zero, and PARDISO perturbs the last pivot."""
+        off = np.ones(39)
+        laplacian = sp.diags_array([-off, np.r_[1.0, 2.0 * off[1:], 1.0], -off], offsets=[-1, 0, 1], format="csr")
+        if not symmetric:
+            laplacian = (sp.diags_array(1.0 + np.arange(40.0)) @ laplacian).tocsr()
+        assert refusal(lambda: Pardiso().factorize(laplacian)).status is Status.SINGULAR_TANGENT
+
+    def test_a_zero_diagonal_is_no_obstacle(self) -> None:
+        saddle = sp.csr_array(np.array([[2.0, 1.0, 1.0], [1.0, 3.0, 1.0], [1.0, 1.0, 0.0]]))
+        for symmetric in ("detect", "never"):
+            x = Pardiso(symmetric=symmetric).factorize(saddle).solve(np.ones(3))
+            np.testing.assert_allclose(saddle @ x, np.ones(3), rtol=1e-12)
+
+    def test_values_that_the_analysis_does_not_fit_are_analysed_anew(self) -> None:
+        random = np.random.default_rng(3)
+        pattern = sp.random_array((40, 40), density=0.2, rng=random, format="csr") + sp.eye_array(40, format="csr")
+        first = Pardiso().factorize(pattern)
+        wild = pattern.copy()
+        wild.data = 10.0 ** random.uniform(-9, 9, wild.nnz)
+        rhs = np.ones(40)
+        found = Pardiso().factorize(wild, first).solve(rhs)
+        assert np.abs(wild @ found - rhs).max() <= 1e-8 * (abs(wild) @ np.abs(found)).max()
+
+    def test_where_the_library_is_absent_the_way_out_is_said(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        monkeypatch.setattr(nlsolve_pardiso, "mkl", None)
+        refused = refusal(lambda: Pardiso().factorize(tangent()))
+        assert refused.status is Status.NOT_APPLICABLE
+        assert "pip install 'nlsolve[pardiso]'" in refused.detail
+
+
+@pytest.mark.parametrize("symmetric", [True, False])
+def test_equilibrium_brings_rows_and_columns_to_one_size(symmetric: bool) -> None:
+    random = np.random.default_rng(0)
+    dense = random.standard_normal((9, 9))
+    sizes = 10.0 ** random.uniform(-20, 20, 9)
+    dense = sizes[:, None] * (dense + dense.T if symmetric else dense) * (sizes if symmetric else sizes[::-1])
+    dense[3] = dense[:, 3] = 0.0
+    rows, columns, even = equilibrated(sp.csr_array(dense), symmetric)
+    np.testing.assert_array_equal(even.toarray(), rows[:, None] * dense * columns)
+    assert is_symmetric(even) == symmetric
+    largest = np.delete(np.abs(even.toarray()).max(axis=0), 3)
+    assert ((largest >= 0.1) & (largest <= 8.0)).all()
+    assert set(np.frexp(rows)[0]) == {0.5}

@@ -1,0 +1,52 @@
+"""Rows and columns brought to one size by powers of two, so that what a library takes for small depends on no unit."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+
+ASYMMETRY = 1e-12  # largest |A − Aᵀ| over largest |A| of a matrix that counts as symmetric
+MOST, NEAR = 12, 3  # steps towards equilibrium, and the power of two within which entries are near 1
+TINY = float(np.finfo(float).tiny)
+
+
+def powers_of_two(sizes: np.ndarray) -> np.ndarray:
+    """The power of two, (U,), that makes each size (U,) between 1/2 and 1; 1 for zero."""
+    return np.where(sizes > 0.0, np.ldexp(1.0, -np.frexp(sizes)[1]), 1.0)
+
+
+def equilibrated(matrix: Any, symmetric: bool) -> tuple[np.ndarray, np.ndarray, Any]:
+    """R and C, both (U,), and R A C of a sparse matrix in compressed rows.
+
+    Where it shall stay symmetric R = C, of roots of the largest entries until these are near 1 (Ruiz 2001).
+    """
+    if symmetric:
+        both, even = np.ones(matrix.shape[0]), matrix
+        for _ in range(MOST):
+            largest = abs(even).max(axis=1).toarray().ravel()
+            if ((largest == 0.0) | (np.abs(np.log2(np.fmax(largest, TINY))) <= NEAR)).all():
+                break
+            both = both * powers_of_two(np.sqrt(largest))
+            even = scaled(matrix, both, both)
+        return both, both, even
+    rows = powers_of_two(abs(matrix).max(axis=1).toarray().ravel())
+    columns = powers_of_two(abs(scaled(matrix, rows, np.ones_like(rows))).max(axis=0).toarray().ravel())
+    return rows, columns, scaled(matrix, rows, columns)
+
+
+def scaled(matrix: Any, rows: np.ndarray, columns: np.ndarray) -> Any:
+    """R A C with the pattern of A, compressed rows; nothing is rounded for powers of two."""
+    data = np.repeat(rows, np.diff(matrix.indptr)) * matrix.data * columns[matrix.indices]
+    return sp.csr_array((data, matrix.indices, matrix.indptr), shape=matrix.shape)
+
+
+def is_symmetric(compressed: Any) -> bool:
+    """Whether a sorted compressed matrix is its transpose, to 1e-12 of its largest entry."""
+    turned = compressed.tocsr() if compressed.format == "csc" else compressed.tocsc()
+    return (
+        np.array_equal(turned.indptr, compressed.indptr)
+        and np.array_equal(turned.indices, compressed.indices)
+        and bool(np.abs(turned.data - compressed.data).max() <= ASYMMETRY * np.abs(compressed.data).max())
+    )

@@ -1,0 +1,128 @@
+"""Supernodal LU, and LDLᵀ for symmetric tangents, by oneMKL PARDISO (Schenk & Gärtner 2004): extra nlsolve[pardiso].
+
+The analysis of a pattern is taken from the previous factors as long as the pattern is the same. PARDISO then overwrites
+those, and it perturbs pivots that vanish without a word: `PardisoFactors` restores what was overwritten, and holds
+every factorisation against its matrix.
+"""
+
+from __future__ import annotations
+
+from typing import Any, ClassVar, Literal
+
+import numpy as np
+import scipy.sparse as sp
+from pydantic import Field
+
+from nlsolve.plugin import Factors, LinearSolver, SolveError, Status
+from nlsolve_linear.equilibrium import equilibrated, is_symmetric
+
+try:
+    import pymklpardiso as mkl
+except ImportError:  # an extra: nlsolve[pardiso]
+    mkl = None
+
+ABSENT = "needs the library py-mkl-pardiso, for x86-64 only: pip install 'nlsolve[pardiso]'"
+
+# PARDISO's parameters, counted from zero. Dissection by METIS; pivots below 10⁻¹³ of the norm are perturbed; scaling
+# and matching for LU, pivots of Bunch & Kaufman (1977) for LDLᵀ; the entries of the factors are counted. No refinement: the
+# ledger refines.
+PARAMETERS: dict[str, dict[int, int]] = {
+    "lu": {1: 2, 9: 13, 10: 1, 12: 1, 17: -1},
+    "ldlt": {1: 2, 9: 13, 17: -1, 20: 1},
+}
+PERTURBED, ENTRIES = 13, 17
+"""Where PARDISO tells how many pivots it has perturbed, and how many entries the factors hold."""
+
+ACCURATE = 1e-9
+"""Largest ‖b − A x‖ over the size of its terms of factors that solve what they were made for."""
+
+REACHED = 1e-6
+"""The same over ‖b‖ where a pivot was perturbed: a singular matrix does not reach every b."""
+
+SINGULAR = 1.0 / float(np.finfo(float).eps)
+"""‖A‖ ‖x‖ over ‖b‖ above which A is singular to working precision."""
+
+
+class _Analysed:
+    """One pattern with its analysis in the library, and the factors that this holds now."""
+
+    def __init__(self, kind: str, matrix: Any) -> None:
+        types = {"lu": mkl.MTYPE_REAL_NONSYM, "ldlt": mkl.MTYPE_REAL_SYM_INDEF}
+        self.solver: Any = mkl.PardisoSolver(matrix, types[kind], iparms=PARAMETERS[kind])
+        self._kind, self._pattern = kind, (matrix.indptr, matrix.indices)
+        self._held = matrix.data
+
+    def is_of(self, kind: str, matrix: Any) -> bool:
+        """Whether a matrix has this pattern and shall have factors of this kind."""
+        return self._kind == kind and all(map(np.array_equal, self._pattern, (matrix.indptr, matrix.indices)))
+
+    def hold(self, values: np.ndarray, anew: bool = False) -> None:
+        """Make the library hold the factors of these values, with a new analysis if wanted."""
+        if anew:
+            self.solver.factor(values)
+        elif values is not self._held:
+            self.solver.refactor(values)
+        self._held = values
+
+
+class PardisoFactors(Factors):
+    """L and U, or L and D, of one matrix."""
+
+    def __init__(self, rows: Any, symmetric: bool, previous: Factors | None) -> None:
+        self._rows, self._columns, matrix = equilibrated(rows, symmetric)
+        kind = "ldlt" if symmetric else "lu"
+        stored = sp.triu(matrix, format="csr") if symmetric else matrix
+        self._values = stored.data
+        self._library: _Analysed
+        earlier = previous._library if isinstance(previous, PardisoFactors) else None
+        try:
+            if earlier is not None and earlier.is_of(kind, stored):
+                self._library = earlier
+                self._library.hold(self._values)
+                if self._left(matrix) > ACCURATE:  # the analysis has the scaling and the matching of other values
+                    self._library.hold(self._values, anew=True)
+            else:
+                self._library = _Analysed(kind, stored)
+        except RuntimeError as failure:
+            raise SolveError(Status.SINGULAR_TANGENT, f"PARDISO: {failure}") from failure
+        left = self._left(matrix)
+        if not left <= ACCURATE:
+            raise SolveError(Status.SINGULAR_TANGENT, "PARDISO: its factors do not solve with the matrix")
+        self.ordering = f"metis, {kind}"
+        self.fill = int(self._library.solver.get_iparm_value(ENTRIES))
+
+    def _left(self, matrix: Any) -> float:
+        """‖b − A x‖ over ‖A‖ ‖x‖ + ‖b‖, maximum norms, for one b; infinite where A counts as singular."""
+        b = np.cos(np.arange(len(self._rows)))
+        x = self._library.solver.solve(b)
+        left, terms = np.abs(b - matrix @ x).max(), abs(matrix).sum(axis=1).max() * np.abs(x).max()
+        unreached = self._library.solver.get_iparm_value(PERTURBED) > 0 and not left <= REACHED
+        return np.inf if unreached or not terms < SINGULAR else float(left / (terms + 1.0))
+
+    def solve(self, rhs: np.ndarray) -> np.ndarray:
+        """x with A x = rhs by one pair of triangular solves, without PARDISO's refinement."""
+        self._library.hold(self._values)  # factors that were lent since are made once more
+        return self._columns * self._library.solver.solve(self._rows * rhs)
+
+
+class Pardiso(LinearSolver):
+    """LU with scaling, matching and pivots within supernodes, and LDLᵀ for a symmetric matrix, at half the entries.
+
+    Its factors give no condition: PARDISO must analyse anew before it solves with the transposed matrix.
+    """
+
+    kind: Literal["pardiso"] = "pardiso"
+    symmetric: Literal["detect", "never"] = Field(
+        "detect", description="LDLᵀ for a matrix found symmetric to 1e-12, the tangent of a conservative form; or never"
+    )
+    absent: ClassVar[str | None] = ABSENT if mkl is None else None
+
+    def factorize(self, matrix: Any, previous: Factors | None = None) -> PardisoFactors:
+        """Factors of a sparse matrix, by the analysis of `previous` if that has the same pattern."""
+        if mkl is None:
+            raise SolveError(Status.NOT_APPLICABLE, f"the linear solver 'pardiso' {ABSENT}")
+        if not np.isfinite(matrix.data).all():
+            raise SolveError(Status.NON_FINITE, "a tangent holds numbers that are not finite")
+        rows = matrix.tocsr(copy=True)  # sorted below; the caller's matrix stays as it is
+        rows.sum_duplicates()
+        return PardisoFactors(rows, self.symmetric == "detect" and is_symmetric(rows), previous)
