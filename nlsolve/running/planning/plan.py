@@ -61,14 +61,14 @@ def plan_of(
     """
     portion = portion_of(study, only, skip, failed, shard)
     standings = Standings(Parts(folder), study.timing, {*retry, *portion.retry})
+    found = {case.id: standings.of(case) for case in study.cases}
+    last = {case: standing.last for case, standing in found.items() if standing.last is not None}
 
     def ending(case: Case) -> str:
-        entry = standings.last(case)
-        return LEFT if entry is None else status_of(entry.measured).word
+        return status_of(last[case.id].measured).word if case.id in last else LEFT
 
     chosen = study.cases if portion.is_whole else portion.cases(study, ending)
-    words = {case: standing.word for case, standing in standings.of_all(chosen).items()}
-    last = {case.id: entry for case in study.cases if (entry := standings.last(case)) is not None}
+    words = {case: standing.word for case, standing in standings.compared(chosen, found).items()}
     known = {case: entry.elapsed for case, entry in last.items() if entry.elapsed == entry.elapsed}
     frame = forecast(study)
     starts = frame["seconds_start"].where(frame["case"].isin(led(study.cases)), 0.0)

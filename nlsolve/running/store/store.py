@@ -89,8 +89,8 @@ class Store:
 
     def ending(self, case: Case) -> str:
         """The word of the status with which a case ended last, or `LEFT`."""
-        entry = self._standings.last(case)
-        return LEFT if entry is None else status_of(entry.measured).word
+        last = self._standings.of(case).last
+        return LEFT if last is None else status_of(last.measured).word
 
     def begin(self, case: Case) -> bool:
         """Claim a case, so that no other run computes it; False while another run has it."""
