@@ -57,8 +57,9 @@ class Entry:
     measured : its row of `runs` without parameters; parameters : those, and the names of settings it was first run by.
     frames : name -> size [bytes] of each frame that has a file.
     written : when, in seconds since 1970.
-    elapsed : seconds from the start of the case until it was written [s]; NaN where that is not known.
-    rounds : see `Part`.
+    elapsed : seconds from the start of the case until it was written, less `startup` [s]; NaN where that is not known.
+    rounds, startup : see `Part`.
+    way : how much of `elapsed` the way to its first state took, where this case has solved it [s].
     """
 
     identity: Identity
@@ -68,6 +69,8 @@ class Entry:
     written: float
     elapsed: float = math.nan
     rounds: Sequence[Row] = ()
+    startup: float = 0.0
+    way: float = 0.0
 
     def run(self, names: Mapping[str, str]) -> Row:
         """The row of `runs` under other names of settings."""
@@ -116,8 +119,15 @@ class Parts:
             return None
         return steps, fields
 
-    def save(self, identity: Identity, part: Part, parameters: Mapping[str, Any], elapsed: float = math.nan) -> None:
-        """Write a part. Its JSON is written last. elapsed : see `Entry`."""
+    def save(
+        self,
+        identity: Identity,
+        part: Part,
+        parameters: Mapping[str, Any],
+        elapsed: float = math.nan,
+        way: float = 0.0,
+    ) -> None:
+        """Write a part. Its JSON is written last. elapsed, way : see `Entry`."""
         measured = {name: value for name, value in part.run.items() if name not in {"case", *parameters}}
         sizes = {}
         for name, frame in (("steps", part.steps), ("fields", part.fields)):
@@ -138,8 +148,9 @@ class Parts:
             "parameters": dict(parameters),
             "frames": sizes,
             "written": time.time(),
-            **({"elapsed": elapsed} if math.isfinite(elapsed) else {}),
+            **({"elapsed": elapsed, "way": way} if math.isfinite(elapsed) else {}),
             "rounds": part.rounds,
+            "startup": part.startup,
         }
         write_text(self.folder, self._path(identity.key, "json"), json.dumps(held, default=_plain))
 

@@ -64,6 +64,7 @@ class Store:
         self._claims = Claims(folder)
         self._standings = Standings(self.parts, study.timing, retry)
         self._started: dict[str, float] = {}
+        self._arrived: dict[str, float] = {}
         self._begun: dict[str, Identity] = {case.id: identity_of(case) for case in study.cases}
         self.write_text(STUDY, json.dumps(describe(study, self._begun), ensure_ascii=False) + "\n")
 
@@ -105,12 +106,17 @@ class Store:
         with self.writing():
             return self._claims.take(EXCLUSIVE)
 
+    def arrive(self, case: Case) -> None:
+        """A case that has begun has solved the way to its first state."""
+        self._arrived[case.id] = time.monotonic()
+
     def save(self, case: Case, part: Part) -> None:
         """Keep a part. It is not kept when a file that the case reads has changed since the case was looked up."""
         identity = identity_of(case)
         if identity == self._begun[case.id]:
-            elapsed = time.monotonic() - self._started.get(case.id, math.nan)
-            self.parts.save(identity, part, case.parameters, elapsed)
+            begun = self._started.get(case.id, math.nan) + part.startup
+            way = self._arrived.pop(case.id, begun) - begun
+            self.parts.save(identity, part, case.parameters, time.monotonic() - begun, way)
 
     def end(self, case: Case) -> None:
         """Give up the claim on a case."""
