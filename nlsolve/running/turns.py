@@ -27,7 +27,7 @@ class Turns:
     """
 
     def __init__(self, study: Study, store: Store | None, chosen: Sequence[Case] | None = None) -> None:
-        self.timing, self.store = study.timing, store
+        self.study, self.timing, self.store = study, study.timing, store
         self.ways = Ways(study.cases, None if store is None else store.folder)
         self.parts: dict[str, Part] = {}
         self.cases = cases = study.cases if chosen is None else chosen

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import pandas as pd
 
 from nlsolve.results.verdicts import number
-from nlsolve.running.planning.experience import FEWEST_LEFT_OUT, OVERHEAD, Expectation, expectation
+from nlsolve.running.planning.experience import OVERHEAD, Expectation, expectation
 from nlsolve.running.store.parts import Entry
 from nlsolve.study.study import Study
 
@@ -66,7 +66,7 @@ def outlook_of(study: Study, costs: pd.DataFrame, last: Mapping[str, Entry]) -> 
     timed = {case: entry for case, entry in last.items() if math.isfinite(entry.elapsed)}
     taken = {case: _own(entry, case in shared) for case, entry in timed.items()}
     later = {case: seconds for case, seconds in taken.items() if not timed[case].startup}
-    own = expectation(study.cases, work, later if len(later) >= FEWEST_LEFT_OUT else taken)
+    own = expectation(study.cases, work, later or taken)
     return Outlook(own, _ways_left(study, shared, way_costs, timed), _startup(own, shared, timed))
 
 

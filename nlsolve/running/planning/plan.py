@@ -81,7 +81,8 @@ def plan_of(
     at_a_time = min(jobs_here(study.timing, jobs), max(1, len(left)))
     if study.timing.is_exclusive:
         least, most = span_in_lane(study, {case: outlook.seconds(case) for case in left})
-        return Plan(frame, least, least, most, at_a_time, _basis(outlook, last))
+        counting = outlook.span(left, at_a_time)[0] if at_a_time > 1 else 0.0
+        return Plan(frame, counting + least, counting + least, counting + most, at_a_time, _basis(outlook, last))
     expected, least, most = (study.timing.rounds * seconds for seconds in outlook.span(left, at_a_time))
     return Plan(frame, expected, least, most, at_a_time, _basis(outlook, last))
 

@@ -25,6 +25,7 @@ from nlsolve.running.store.identity import identity_of
 from nlsolve.running.store.parts import Entry, Parts
 from nlsolve.study.case import Case
 from nlsolve.study.study import Study
+from nlsolve.study.timing import Timing
 
 SOLVERS = ("newton", "modified-newton", "broyden", "anderson")
 
@@ -178,6 +179,16 @@ def test_a_plan_says_what_its_seconds_rest_on_and_how_many_cases_run_at_a_time(t
     assert len(after.left) == 12
     assert after.seconds == pytest.approx(12 * 3.0 / 2, rel=0.3)
     assert plan_of(study, tmp_path, only="case=" + study.cases[5].id, jobs=2).jobs == 1
+
+
+def test_several_cases_at_a_time_are_counted_before_they_are_timed(tmp_path, monkeypatch):
+    costs = costs_of(grid())
+    monkeypatch.setattr("nlsolve.running.planning.plan.forecast", lambda study: costs.copy())
+    study = replace(grid(), timing=Timing(lane="exclusive"))
+    one, two = (plan_of(study, tmp_path, jobs=jobs) for jobs in (1, 2))
+    counting = STARTUP + len(study.cases) * (2.0 + OVERHEAD) / 2
+    assert two.seconds == pytest.approx(one.seconds + counting)
+    assert two.seconds_most == pytest.approx(one.seconds_most + counting)
 
 
 def test_a_run_keeps_how_long_each_case_took(tmp_path):
