@@ -6,6 +6,7 @@ import time
 from collections.abc import Collection, Mapping
 from contextlib import closing
 from dataclasses import dataclass, replace
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -25,7 +26,6 @@ from nlsolve.running.timing.exclusive import CountingTurns, ExclusiveTurns
 from nlsolve.running.turns import Turns
 from nlsolve.show.expectations import Finding, judged
 from nlsolve.show.figures import FigureError, draw, save
-from nlsolve.show.report import write_report
 from nlsolve.show.tables import Table, build, built
 from nlsolve.study.study import Study
 from nlsolve.study.timing import Timing
@@ -233,7 +233,8 @@ def _show(store: Store, study: Study, frames: Frames) -> tuple[str, ...]:
         environments = environments_of(store.parts, frames.runs)
         left_out = [(excluded.label, excluded.reason) for excluded in study.excluded]
         findings = Results(study, frames.runs, frames.steps, frames.fields).findings
-        write_report(
+        report = import_module("nlsolve.show.report")  # loads jinja2, which a run with nothing to show does without
+        report.write_report(
             store.folder, study.question, shown, captions, frames.runs, environments, findings, left_out, beneath
         )
     return tuple(notes)
