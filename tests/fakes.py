@@ -258,3 +258,26 @@ def fake_march(
     summary = {"status": "converged", "message": "the stopping test was met", "tangents": tangents, "ordering": None}
     outcome = Outcome(Status.CONVERGED, Status.CONVERGED.sentence, np.zeros(1), 0.0)
     return Record({**summary, "factorizations": 2, "velocity_error": float("nan")}, outcome, steps, fields)
+
+
+def solver_text(kind: str) -> str:
+    """The text of a plugin of one file with Newton's method under another kind, which also offers it by the hook."""
+    name = kind.capitalize()
+    return f"""
+from typing import Literal
+from nlsolve.plugin import NonlinearSolver, Step, hookimpl
+
+class {name}(NonlinearSolver):
+    kind: Literal["{kind}"] = "{kind}"
+
+    def steps(self, problem, tangent, start):
+        state = start
+        while True:
+            yield Step(state)
+            tangent.refresh_if_due(lambda: problem.jacobian(state))
+            state = state - tangent.solve(problem.residual(state))
+
+@hookimpl
+def nlsolve_components():
+    return [{name}]
+"""

@@ -180,7 +180,14 @@ def plan(
         planned = plan_of(checked, folder, statuses(retry or []), only or [], skip or [], failed, shard, jobs)
     frame = planned.cases
     if as_json:
-        told = {"assumption": planned.basis, "seconds": planned.seconds, "jobs": planned.jobs, "folder": str(folder)}
+        told = {
+            "assumption": planned.basis,
+            "seconds": planned.seconds,
+            "seconds_least": planned.seconds_least,
+            "seconds_most": planned.seconds_most,
+            "jobs": planned.jobs,
+            "folder": str(folder),
+        }
         typer.echo(json.dumps({**to_jsonable_python(told), "cases": json_rows(frame)}))
         return
     swept = list(dict.fromkeys(name for case in checked.cases for name in case.swept))
@@ -193,7 +200,9 @@ def plan(
         how_long = f"{planned.seconds:.3g} to {planned.seconds_most:.3g} s to time {count(len(planned.left))} in rounds"
     else:
         side_by_side = f", {planned.jobs} at a time" if planned.jobs > 1 else ""
-        how_long = f"{planned.seconds:.3g} s to run {count(len(planned.left))}{side_by_side}"
+        is_known = planned.seconds_most > planned.seconds
+        between = f" ({planned.seconds_least:.3g} to {planned.seconds_most:.3g} s)" if is_known else ""
+        how_long = f"{planned.seconds:.3g} s{between} to run {count(len(planned.left))}{side_by_side}"
     typer.echo(f"{how_long} ({planned.basis})")
 
 

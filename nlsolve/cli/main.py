@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import sys
 from importlib import import_module
 from importlib.metadata import version
@@ -11,5 +12,9 @@ def main() -> None:
     """Run `nlsolve …`; `nlsolve --version` loads no library."""
     if sys.argv[1:] == ["--version"]:
         print(f"nlsolve {version('nlsolve')}")
-    else:
-        import_module("nlsolve.cli.app").app()
+        return
+    gc.disable()  # what the libraries make as they are loaded is kept: to look for garbage in it takes 0.2 s
+    commands = import_module("nlsolve.cli.app").app
+    gc.freeze()
+    gc.enable()
+    commands()

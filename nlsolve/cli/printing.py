@@ -25,8 +25,9 @@ from nlsolve.running.store.reading import output_file
 from nlsolve.show.tables import Table
 from nlsolve.study.study import Study
 
-MOST_RULED_ROWS, MOST_RULED_CELLS = 500, 5000
-"""Size up to which a table is printed with rules; ruling a hundred thousand cells takes half a minute."""
+MOST_RULED_ROWS, MOST_RULED_COLUMNS, MOST_RULED_CELLS = 500, 40, 5000
+"""Size up to which a table is printed with rules: ruling a hundred thousand cells takes half a minute, and of a hundred
+columns one letter each is left."""
 
 UNFOLDED = 400
 """Characters a line may have in a file or a pipe."""
@@ -88,7 +89,8 @@ def print_table(table: Table) -> None:
 
 
 def _is_large(frame: pd.DataFrame) -> bool:
-    return len(frame) > MOST_RULED_ROWS or frame.size > MOST_RULED_CELLS
+    rows, columns = frame.shape
+    return rows > MOST_RULED_ROWS or columns > MOST_RULED_COLUMNS or frame.size > MOST_RULED_CELLS
 
 
 def print_results(results: Results, as_json: bool) -> None:
@@ -125,7 +127,7 @@ def print_plugins(rows: list[PluginRow]) -> None:
 def say_endings(results: Results) -> None:
     """Say how many cases ended how, with the message of one case of each ending that is no convergence, and one of
     the doubts that no audit explains."""
-    runs = results.runs
+    runs, rows = results.runs, rows_of(results.runs)
     numbers = {str(word): int(cases) for word, cases in runs["status"].value_counts().items()}
     endings = ", ".join(f"{cases} {word}" for word, cases in numbers.items())
     say(f"{count(len(runs))}: {endings or 'none has ended'}; results in {results.folder}")
@@ -138,10 +140,10 @@ def say_endings(results: Results) -> None:
     if crash is not None:
         more = _more(numbers[Status.CRASHED.word])
         say(f"case {crash['case']}{more} crashed: {crash['message']}{_printed(results, crash)}")
-    doubted = [run for run in rows_of(runs) if doubt(run) and not _is_audited(run)]
+    doubted = [run for run in rows if doubt(run) and not _is_audited(run)]
     if doubted:
         say(f"case {doubted[0]['case']}{_more(len(doubted))} is in doubt: {doubt(doubted[0])}")
-    kept = sorted({run["status"] for run in rows_of(runs) if is_final(run)})
+    kept = sorted({run["status"] for run in rows if is_final(run)})
     if kept:
         options = " ".join(f"--retry {word!r}" for word in kept)
         say(f"what was stopped at a limit is run again when the limit is raised, and all of these with {options}")

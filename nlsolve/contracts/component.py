@@ -27,7 +27,13 @@ class Component(BaseModel):
     `with_` gives a validated copy. Raises ValidationError for unknown fields and non-finite numbers.
     """
 
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, validate_default=True)
+    model_config = ConfigDict(
+        frozen=True,
+        extra="forbid",
+        allow_inf_nan=False,
+        validate_default=True,
+        defer_build=True,  # a study uses a few of the installed classes, and each takes a millisecond to be built
+    )
 
     noun: ClassVar[str] = "component"
     """What the contract is called in a study file: "law", "scene", …; set by each contract."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from enum import Enum
+from functools import cache
 
 
 class Status(Enum):
@@ -26,6 +27,7 @@ class Status(Enum):
     OUT_OF_MEMORY = "the case was stopped because it held more memory than its limit, or than there is"
 
     @property
+    @cache
     def word(self) -> str:
         """The short name used in the `status` column."""
         return self.name.lower().replace("_", " ")
@@ -33,10 +35,15 @@ class Status(Enum):
     @classmethod
     def of(cls, word: str) -> Status:
         """The status whose `word` stands in a result frame. Raises ValueError for any other word."""
-        for status in cls:
-            if status.word == word:
-                return status
-        raise ValueError(f"{word!r} is no status: there are {', '.join(status.word for status in cls)}")
+        known = cls._by_word()
+        if word not in known:
+            raise ValueError(f"{word!r} is no status: there are {', '.join(known)}")
+        return known[word]
+
+    @classmethod
+    @cache
+    def _by_word(cls) -> dict[str, Status]:
+        return {status.word: status for status in cls}
 
     @property
     def sentence(self) -> str:

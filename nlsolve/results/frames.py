@@ -30,6 +30,7 @@ class Part:
     environment : what it was computed with, such as versions and processor; its row has the digest of it.
     output : what the case has printed, cut in the middle where it is long; empty where nobody has listened.
     rounds : of a case in the exclusive lane, what each round has measured: columns of `runs`.
+    startup : how long the case has waited for a process of its own that had to be started for it [s].
     """
 
     run: Row
@@ -38,6 +39,7 @@ class Part:
     environment: Mapping[str, str] = field(default_factory=dict)
     output: str = ""
     rounds: tuple[Row, ...] = ()
+    startup: float = 0.0
 
 
 def steps_frame(rows: Sequence[Mapping[str, Any]]) -> pd.DataFrame:

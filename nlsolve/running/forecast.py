@@ -43,20 +43,28 @@ SAMPLE = [
 
 def forecast(study: Study) -> pd.DataFrame:
     """One row for each case: its swept parameters, its size, and its seconds [s] under the `ASSUMPTION`."""
-    measured: dict[str, dict[str, Any]] = {}
+    known: dict[str, dict[str, Any]] = {}
     rows = []
     for case in study.cases:
-        if case.problem not in measured:
-            measured[case.problem] = costs_of(case.parts)
-        costs, work = measured[case.problem], simulation_of(case.parts, Ledger().entry).workload()
-        seconds = {
-            "seconds_start": STAGE * work.stages * costs["seconds_iteration"],
-            "seconds": work.increments * costs["seconds_increment"],
-        }
-        seconds["seconds_all"] = sum(seconds.values()) + work.discretizations * costs["seconds_operators"]
+        if case.problem not in known:
+            known[case.problem] = _seconds_of(case.parts)
         swept = {name: case.parameters[name] for name in case.swept}
-        rows.append({"case": case.id, **swept, "increments": work.increments, **costs, **seconds})
+        rows.append({"case": case.id, **swept, **known[case.problem]})
     return pd.DataFrame(rows)
+
+
+def _seconds_of(parts: Any) -> dict[str, Any]:
+    """The columns of `forecast` that cases which differ in method only have in common."""
+    costs, work = costs_of(parts), simulation_of(parts, Ledger().entry).workload()
+    start = STAGE * work.stages * costs["seconds_iteration"]
+    seconds = work.increments * costs["seconds_increment"]
+    return {
+        "increments": work.increments,
+        **costs,
+        "seconds_start": start,
+        "seconds": seconds,
+        "seconds_all": start + seconds + work.discretizations * costs["seconds_operators"],
+    }
 
 
 def span_in_lane(study: Study, seconds: Mapping[str, float]) -> tuple[float, float]:

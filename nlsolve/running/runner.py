@@ -5,7 +5,8 @@ from __future__ import annotations
 import time
 from collections.abc import Collection, Mapping
 from contextlib import closing
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -14,20 +15,20 @@ import pandas as pd
 from nlsolve.contracts.status import Status
 from nlsolve.registry.problems import StudyError, did_you_mean
 from nlsolve.results.frames import Frames, Part, rows_of
-from nlsolve.running.engines.choice import engine_for
-from nlsolve.running.engines.engine import Event, Listener
+from nlsolve.running.engines.choice import counter_for, engine_for
+from nlsolve.running.engines.engine import Engine, Event, Listener
 from nlsolve.running.engines.execution import Debugger
 from nlsolve.running.portions.portion import FAILED, portion_of
 from nlsolve.running.store.parts import Parts, StoreError, merge
 from nlsolve.running.store.reading import completed, description_of, environments_of, finished, of_one_source
 from nlsolve.running.store.store import Store
-from nlsolve.running.timing.exclusive import ExclusiveTurns
+from nlsolve.running.timing.exclusive import CountingTurns, ExclusiveTurns
 from nlsolve.running.turns import Turns
 from nlsolve.show.expectations import Finding, judged
 from nlsolve.show.figures import FigureError, draw, save
-from nlsolve.show.report import write_report
 from nlsolve.show.tables import Table, build, built
 from nlsolve.study.study import Study
+from nlsolve.study.timing import Timing
 
 SECONDS_BETWEEN_FRAMES = 10.0
 """Least time between two writings of the merged frames [s]; the part of a case is saved as soon as the case ends."""
@@ -118,7 +119,10 @@ def run(
     study = study_of(study, overrides, quick)
     chosen_engine = engine_for(study.timing, isolation, jobs, debugger, engine, scheduler)
     portion = portion_of(study, only, skip, failed, shard)
-    store = None if out is None else Store(Path(out), study, {*retry, *portion.retry})
+    counter, counting = counter_for(study.timing, jobs), replace(study, timing=Timing(clock=study.timing.clock))
+    again = {*retry, *portion.retry}
+    early = None if out is None or counter is None else Store(Path(out), counting, again)
+    store = None if out is None else Store(Path(out), study, again)
     chosen = None if portion.is_whole else portion.cases(study, None if store is None else store.ending)
     tell = listen or (lambda event: None)
     if store is not None and (unchanged := store.unchanged()) is not None:
@@ -126,27 +130,38 @@ def run(
         for number, (case, row) in enumerate(zip(study.cases, rows_of(frames.runs), strict=True), 1):
             tell(Event(case, number, len(study.cases), run=row, resumed=True))
         return Results(study, frames.runs, frames.steps, frames.fields, store.folder, notes)
-    turns = (ExclusiveTurns if study.timing.is_exclusive else Turns)(study, store, chosen)
-    written = time.monotonic()
-    try:
-        with closing(chosen_engine.parts(turns.each(tell), study.timing, tell)) as ended:
-            for turn, again in ended:
-                part = turns.end(turn, again)
-                if store is not None and time.monotonic() - written > SECONDS_BETWEEN_FRAMES:
-                    store.write_frames(_merged(study, turns.gather()))
-                    written = time.monotonic()
-                tell(turn.event(run=part.run))
-    finally:
-        frames = _merged(study, turns.gather())
-        turns.close()
-        if store is not None:
-            store.write_frames(frames)
-    notes = (*chosen_engine.notes, *_unfinished(len(frames.runs), len(study.cases), bool(study.expectations)))
+    if study.timing.is_exclusive:
+        counted = {} if counter is None else _taken(CountingTurns(counting, early, chosen), counter, tell)
+        turns: Turns = ExclusiveTurns(study, store, chosen, counted)
+    else:
+        turns = Turns(study, store, chosen)
+    frames = _merged(study, _taken(turns, chosen_engine, tell))
+    told = (*(counter.notes if counter is not None else ()), *chosen_engine.notes)
+    notes = (*told, *_unfinished(len(frames.runs), len(study.cases), bool(study.expectations)))
     if store is None:
         return Results(study, frames.runs, frames.steps, frames.fields, notes=notes)
     notes += _show(store, study, frames)
     store.mark_shown(notes)
     return Results(study, frames.runs, frames.steps, frames.fields, store.folder, notes)
+
+
+def _taken(turns: Turns, engine: Engine, tell: Listener) -> dict[str, Part]:
+    """The parts of a study when all turns have been taken; its folder has the frames also where a run is ended."""
+    written = time.monotonic()
+    try:
+        with closing(engine.parts(turns.each(tell), turns.timing, tell)) as ended:
+            for turn, again in ended:
+                part = turns.end(turn, again)
+                if turns.store is not None and time.monotonic() - written > SECONDS_BETWEEN_FRAMES:
+                    turns.store.write_frames(_merged(turns.study, turns.gather()))
+                    written = time.monotonic()
+                tell(turn.event(run=part.run))
+    finally:
+        parts = turns.gather()
+        turns.close()
+        if turns.store is not None:
+            turns.store.write_frames(_merged(turns.study, parts))
+    return parts
 
 
 def load(folder: str | Path) -> Results:
@@ -218,7 +233,8 @@ def _show(store: Store, study: Study, frames: Frames) -> tuple[str, ...]:
         environments = environments_of(store.parts, frames.runs)
         left_out = [(excluded.label, excluded.reason) for excluded in study.excluded]
         findings = Results(study, frames.runs, frames.steps, frames.fields).findings
-        write_report(
+        report = import_module("nlsolve.show.report")  # loads jinja2, which a run with nothing to show does without
+        report.write_report(
             store.folder, study.question, shown, captions, frames.runs, environments, findings, left_out, beneath
         )
     return tuple(notes)

@@ -13,6 +13,7 @@ from nlsolve.running.store.identity import way_of
 from nlsolve.running.store.store import Store
 from nlsolve.running.timing.rounds import rounds_of
 from nlsolve.running.ways.ways import Ways
+from nlsolve.solving.way import Way
 from nlsolve.study.case import Case
 from nlsolve.study.study import Study
 from nlsolve.study.timing import Timing
@@ -26,7 +27,7 @@ class Turns:
     """
 
     def __init__(self, study: Study, store: Store | None, chosen: Sequence[Case] | None = None) -> None:
-        self.timing, self.store = study.timing, store
+        self.study, self.timing, self.store = study, study.timing, store
         self.ways = Ways(study.cases, None if store is None else store.folder)
         self.parts: dict[str, Part] = {}
         self.cases = cases = study.cases if chosen is None else chosen
@@ -90,7 +91,13 @@ class Turns:
     def _on_its_way(self, turn: Turn) -> Turn:
         """A turn that begins, with the way to its first state where that is known."""
         case = turn.case
-        return replace(turn, way=self.ways.begin(case), share=lambda way: self.ways.keep(case, way))
+        return replace(turn, way=self.ways.begin(case), share=lambda way: self._share(case, way))
+
+    def _share(self, case: Case, way: Way) -> None:
+        """A case has solved the way to its first state."""
+        self.ways.keep(case, way)
+        if self.store is not None:
+            self.store.arrive(case)
 
     def _next(self) -> tuple[int, Turn] | None:
         for _ in range(len(self._waiting)):

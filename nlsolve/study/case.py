@@ -6,6 +6,7 @@ import hashlib
 import json
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 from pydantic import BaseModel, ConfigDict, ValidationError, create_model
@@ -52,6 +53,7 @@ class Case:
 
     id : digest of the validated components; the limits belong to it where a sweep sets them.
     parts : the validated component of each section, under its name.
+    known : the same with all that is known of each; cases share it.
     parameters : every parameter under its dotted name ("solver.order"); lists as JSON text. Where a sweep has named
         settings, the names of this case's settings come first, under `variant` or the sweep's own `name`.
     swept : names of the parameters that the study sweeps and that differ between its cases; `variant` stands for every
@@ -63,6 +65,7 @@ class Case:
 
     id: str
     parts: Any
+    known: Mapping[str, KnownPart]
     parameters: Mapping[str, Any]
     swept: tuple[str, ...]
     reference: str = ""
@@ -75,11 +78,12 @@ class Case:
         words = [f"{'' if names_settings(name) else f'{name} = '}{self.parameters[name]}" for name in self.swept]
         return ", ".join(words) or "the only case"
 
-    @property
+    @cached_property
     def problem(self) -> str:
-        """What the case solves, and with which linear solver: the same for cases that differ in method only."""
-        parts = ((name, part) for name, part in self.parts if name not in METHOD and part is not None)
-        return "".join(f"{name} {class_name(type(part))} {part.model_dump_json()}" for name, part in parts)
+        """A digest of what the case solves, and with which linear solver: the same for cases that differ in method
+        only."""
+        told = (name for name, part in self.known.items() if name not in METHOD and part.component is not None)
+        return _digest(self.known, told)
 
 
 class Invalid(Exception):
@@ -124,8 +128,8 @@ class Composer:
         swept = {name.split(".")[0] for point in points for name in point.values}
         telling = [name for name in known if name != Limits.noun or name in swept]
         way = {name: getattr(parts, name) for name in parts.scene.way(parts)}
-        parameters = _parameters(known, points)
-        return Case(_digest(known, telling), parts, *parameters, way=way, way_id=_digest(known, way) if way else "")
+        way_id = _digest(known, way) if way else ""
+        return Case(_digest(known, telling), parts, known, *_parameters(known, points), way=way, way_id=way_id)
 
     def parts(self, document: Document) -> tuple[Mapping[str, KnownPart], type[BaseModel]]:
         """The validated part of each section, and the model of them all; a section that is left out gets its default.
@@ -268,7 +272,7 @@ def section_rows(registry: Registry) -> list[PluginRow]:
 
 def _digest(known: Mapping[str, KnownPart], names: Iterable[str]) -> str:
     """The digest of the components of these sections."""
-    canonical = ",".join(f"{json.dumps(name)}:{known[name].text}" for name in sorted(names))
+    canonical = ",".join(f'"{name}":{known[name].text}' for name in sorted(names))
     return hashlib.sha256(f"{{{canonical}}}".encode()).hexdigest()[:DIGEST_LETTERS]
 
 

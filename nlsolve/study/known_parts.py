@@ -3,10 +3,15 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
+from functools import cache
+from pathlib import Path
 from typing import Any
 
+from pydantic import BaseModel
+
+from nlsolve.contracts.component import NAMES_A_FILE
 from nlsolve.study.sweeps import Document, leaves
 
 Key = tuple[type, str, str]
@@ -20,11 +25,14 @@ class KnownPart:
     component : None where the section has none.
     text : its fields as JSON, keys in order.
     parameters : its fields under dotted names, lists as JSON text.
+    classes, files : the class and the files of each component at any depth.
     """
 
     component: Any
     text: str
     parameters: Mapping[str, Any]
+    classes: frozenset[type]
+    files: tuple[str, ...]
 
     @classmethod
     def of(cls, name: str, component: Any, plain: Any) -> KnownPart:
@@ -33,7 +41,8 @@ class KnownPart:
         parameters = {
             dotted: json.dumps(value) if isinstance(value, list | dict) else value for dotted, value in leaves(flat)
         }
-        return cls(component, json.dumps(plain, sort_keys=True, separators=(",", ":")), parameters)
+        text = json.dumps(plain, sort_keys=True, separators=(",", ":"))
+        return cls(component, text, parameters, classes_of(component), files_read(component))
 
 
 @dataclass
@@ -60,6 +69,46 @@ class KnownParts:
 def keys_of(document: Document, names: Iterable[str]) -> dict[str, str] | None:
     """The table of each section as JSON; None when a table holds what JSON cannot tell apart from another value."""
     try:
-        return {name: json.dumps(document.get(name), sort_keys=True) for name in names}
+        return {name: _written(document.get(name)) for name in names}
     except (TypeError, ValueError):
         return None
+
+
+_written = json.JSONEncoder(sort_keys=True).encode
+
+
+def classes_of(value: Any) -> frozenset[type]:
+    """The class of every component in a value, at any depth."""
+    return frozenset(map(type, _inside(value)))
+
+
+def files_read(value: Any) -> tuple[str, ...]:
+    """The files whose contents a value depends on: fields of type `InputFile`, and those that hold a Path, in every
+    component in it."""
+    found = [
+        str(Path(given))
+        for model in _inside(value)
+        for name, is_named in _fields(type(model))
+        if isinstance(given := getattr(model, name), Path) or (is_named and isinstance(given, str))
+    ]
+    return tuple(dict.fromkeys(found))
+
+
+def _inside(value: Any) -> Iterator[BaseModel]:
+    """Every component in a value, at any depth."""
+    if isinstance(value, BaseModel):
+        yield value
+        for name, _ in _fields(type(value)):
+            yield from _inside(getattr(value, name))
+    elif isinstance(value, Mapping):
+        for inner in value.values():
+            yield from _inside(inner)
+    elif isinstance(value, list | tuple):
+        for inner in value:
+            yield from _inside(inner)
+
+
+@cache
+def _fields(cls: type[BaseModel]) -> list[tuple[str, bool]]:
+    """The fields of a class, and whether each is of type `InputFile`."""
+    return [(name, NAMES_A_FILE in field.metadata) for name, field in cls.model_fields.items()]

@@ -7,6 +7,7 @@ import tomllib
 from collections.abc import Iterator, Mapping
 from copy import deepcopy
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
@@ -41,7 +42,7 @@ class Point:
     place: Place = ()
     places: Mapping[str, Place] = field(default_factory=dict)
 
-    @property
+    @cached_property
     def label(self) -> str:
         """The point as text for people."""
         return self.name or ", ".join(f"{name} = {value}" for name, value in self.values.items())

@@ -53,7 +53,7 @@ def engine_for(
     if scheduler is not None and engine != "dask":
         raise StudyError(f"scheduler = {scheduler!r}: only the engine 'dask' has one; add it, or drop the scheduler")
     if timing.is_exclusive:
-        return _pinned(chosen, jobs, debugger, engine)
+        return _pinned(chosen, debugger, engine)
     if engine == "dask":
         if chosen == "none":
             raise StudyError("the engine 'dask' runs each case in a worker process: drop it, or isolation and debugger")
@@ -72,13 +72,20 @@ def engine_for(
     return workers
 
 
-def _pinned(isolation: str, jobs: int | None, debugger: Debugger | None, engine: str | None) -> Engine:
+def counter_for(timing: Timing, jobs: int | None) -> Engine | None:
+    """The engine that runs the cases of the exclusive lane side by side before they are timed, so that only those that
+    arrive have to be; None without that lane, and for one case at a time."""
+    if not timing.is_exclusive or jobs is None or jobs < 2:
+        return None
+    return engine_for(Timing(), jobs=jobs, isolation="process")
+
+
+def _pinned(isolation: str, debugger: Debugger | None, engine: str | None) -> Engine:
     """The engine of the exclusive lane. Raises StudyError for what it does not go together with."""
     wishes = {
         "engine = 'dask'": engine == "dask",
         "a debugger": debugger is not None,
         "isolation = 'none'": isolation == "none",
-        f"jobs = {jobs}": jobs not in (None, 1),
     }
     for wish, is_wished in wishes.items():
         if is_wished:

@@ -6,18 +6,16 @@ Names of tables and settings, the question, the order of sweeps and the other ca
 from __future__ import annotations
 
 import json
-from collections.abc import Collection, Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import asdict, dataclass
 from functools import cache, cached_property
 from pathlib import Path
 from typing import Any
 
-from pydantic import BaseModel
-
-from nlsolve.contracts.component import NAMES_A_FILE
 from nlsolve.registry.hookspecs import PROJECT
 from nlsolve.running.store.sources import fingerprint, sources_of
 from nlsolve.study.case import Case
+from nlsolve.study.known_parts import KnownPart, classes_of
 
 MISSING = "missing"
 """Stands for the content of a file that cannot be read; when it can be, the case is another one."""
@@ -39,8 +37,7 @@ class Identity:
     @cached_property
     def key(self) -> str:
         """The name of a part: CASE-REST, with one digest of code and files."""
-        rest = json.dumps([dict(self.code), dict(self.files)], sort_keys=True)
-        return f"{self.case}-{fingerprint(rest.encode())}"
+        return f"{self.case}-{_digest(tuple(self.code.items()), tuple(self.files.items()))}"
 
     def plain(self) -> dict[str, Any]:
         """The identity as JSON values."""
@@ -62,70 +59,45 @@ def case_of(key: str) -> str:
 
 def identity_of(case: Case) -> Identity:
     """The identity of a case as it would be run now."""
-    return _identity(case.id, [value for _, value in case.parts])
+    return _identity(case.id, case.known.values())
 
 
 def way_of(case: Case) -> str:
     """The name of a case's way to its first state; cases of one name share it. Empty: it has none."""
-    return _identity(case.way_id, case.way.values()).key if case.way else ""
+    return _identity(case.way_id, [case.known[name] for name in case.way]).key if case.way else ""
 
 
-def _identity(name: str, sections: Collection[Any]) -> Identity:
-    models = [value for section in sections for value in _inside(section)]
-    files = {str(path): _content(path) for value in models for path in files_read(value)}
-    return Identity(name, _code_of_classes(frozenset(map(type, models))), dict(sorted(files.items())))
+def _identity(name: str, parts: Collection[KnownPart]) -> Identity:
+    classes = frozenset[type]().union(*(part.classes for part in parts))
+    files = {path: _content(path) for part in parts for path in part.files}
+    return Identity(name, _code_of(classes), dict(sorted(files.items())))
 
 
 def code_of(sections: Iterable[Any]) -> dict[str, str]:
     """Package -> version and fingerprint of its source, for the classes of these components at any depth."""
-    return dict(_code_of_classes(frozenset(type(value) for section in sections for value in _inside(section))))
+    return dict(_code_of(frozenset[type]().union(*map(classes_of, sections))))
 
 
 @cache
-def _code_of_classes(classes: frozenset[type]) -> Mapping[str, str]:
+def _code_of(classes: frozenset[type]) -> Mapping[str, str]:
     found: dict[str, str] = {}
     for cls in classes:
         found |= sources_of(cls)
     return dict(sorted(found.items()))
 
 
-def files_read(value: BaseModel) -> Iterator[Path]:
-    """The files whose contents a component depends on: its fields of type `InputFile`, and those that hold a Path."""
-    for name, is_named in _fields(type(value)):
-        given = getattr(value, name)
-        if isinstance(given, Path) or (is_named and isinstance(given, str)):
-            yield Path(given)
-
-
 @cache
-def _fields(cls: type[BaseModel]) -> list[tuple[str, bool]]:
-    """The fields of a class, and whether each is of type `InputFile`."""
-    return [(name, NAMES_A_FILE in field.metadata) for name, field in cls.model_fields.items()]
-
-
-def _models(parts: BaseModel) -> Iterator[BaseModel]:
-    """Every component of a case, at any depth."""
-    for name, _ in _fields(type(parts)):
-        yield from _inside(getattr(parts, name))
-
-
-def _inside(value: Any) -> Iterator[BaseModel]:
-    if isinstance(value, BaseModel):
-        yield value
-        yield from _models(value)
-    elif isinstance(value, Mapping):
-        for inner in value.values():
-            yield from _inside(inner)
-    elif isinstance(value, list | tuple):
-        for inner in value:
-            yield from _inside(inner)
+def _digest(code: tuple[tuple[str, str], ...], files: tuple[tuple[str, str], ...]) -> str:
+    """One digest of code and files, which most cases of a study have in common."""
+    return fingerprint(json.dumps([dict(code), dict(files)], sort_keys=True).encode())
 
 
 _contents: dict[tuple[str, int, int], str] = {}
 
 
-def _content(path: Path) -> str:
+def _content(name: str) -> str:
     """The fingerprint of a file's contents, computed once while neither its time nor its size changes."""
+    path = Path(name)
     try:
         found = path.stat()
         key = (str(path.resolve()), found.st_mtime_ns, found.st_size)

@@ -26,6 +26,7 @@ import numpy as np
 import pandas as pd
 from pandas.api.types import is_object_dtype
 from pyarrow import ArrowException
+from pydantic_core import from_json
 
 from nlsolve.contracts.status import InputError
 from nlsolve.results.columns import FIELDS, RUNS, STEPS
@@ -56,8 +57,9 @@ class Entry:
     measured : its row of `runs` without parameters; parameters : those, and the names of settings it was first run by.
     frames : name -> size [bytes] of each frame that has a file.
     written : when, in seconds since 1970.
-    elapsed : seconds from the start of the case until it was written [s]; NaN where that is not known.
-    rounds : see `Part`.
+    elapsed : seconds from the start of the case until it was written, less `startup` [s]; NaN where that is not known.
+    rounds, startup : see `Part`.
+    way : how much of `elapsed` the way to its first state took, where this case has solved it [s].
     """
 
     identity: Identity
@@ -67,6 +69,8 @@ class Entry:
     written: float
     elapsed: float = math.nan
     rounds: Sequence[Row] = ()
+    startup: float = 0.0
+    way: float = 0.0
 
     def run(self, names: Mapping[str, str]) -> Row:
         """The row of `runs` under other names of settings."""
@@ -79,6 +83,7 @@ class Parts:
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
+        self._cases = folder / CASES
 
     def names(self) -> list[str]:
         """The names of all parts, complete or damaged."""
@@ -95,17 +100,17 @@ class Parts:
     def entry(self, key: str) -> Entry | None:
         """What the JSON of a part holds; None when there is none, or it or one of its frames is damaged."""
         try:
-            held = json.loads((self.folder / CASES / f"{key}.json").read_text(encoding="utf-8"))
+            held = from_json(self._path(key, "json").read_bytes())
             entry = Entry(**{**held, "identity": Identity(**held["identity"])})
             status_of(entry.measured)
-            whole = all(self._path(key, name).stat().st_size == size for name, size in entry.frames.items())
+            whole = all(self._frame(key, name).stat().st_size == size for name, size in entry.frames.items())
         except (OSError, ValueError, TypeError, KeyError, AttributeError, RecursionError):
             return None
         return entry if whole and entry.identity.key == key else None
 
     def frames(self, entry: Entry) -> tuple[pd.DataFrame, pd.DataFrame] | None:
         """The rows of `steps` and `fields` of a part; None when they are damaged."""
-        paths = {name: self._path(entry.identity.key, name) for name in entry.frames}
+        paths = {name: self._frame(entry.identity.key, name) for name in entry.frames}
         try:
             steps, fields = (
                 pd.read_parquet(paths[name]) if name in paths else pd.DataFrame() for name in ("steps", "fields")
@@ -114,13 +119,20 @@ class Parts:
             return None
         return steps, fields
 
-    def save(self, identity: Identity, part: Part, parameters: Mapping[str, Any], elapsed: float = math.nan) -> None:
-        """Write a part. Its JSON is written last. elapsed : see `Entry`."""
+    def save(
+        self,
+        identity: Identity,
+        part: Part,
+        parameters: Mapping[str, Any],
+        elapsed: float = math.nan,
+        way: float = 0.0,
+    ) -> None:
+        """Write a part. Its JSON is written last. elapsed, way : see `Entry`."""
         measured = {name: value for name, value in part.run.items() if name not in {"case", *parameters}}
         sizes = {}
         for name, frame in (("steps", part.steps), ("fields", part.fields)):
             if len(frame):
-                path = self._path(identity.key, name)
+                path = self._frame(identity.key, name)
                 write_frame(self.folder, path, frame)
                 sizes[name] = path.stat().st_size
         output = output_path(self.folder, identity.key)
@@ -136,10 +148,11 @@ class Parts:
             "parameters": dict(parameters),
             "frames": sizes,
             "written": time.time(),
-            **({"elapsed": elapsed} if math.isfinite(elapsed) else {}),
+            **({"elapsed": elapsed, "way": way} if math.isfinite(elapsed) else {}),
             "rounds": part.rounds,
+            "startup": part.startup,
         }
-        write_text(self.folder, self.folder / CASES / f"{identity.key}.json", json.dumps(held, default=_plain))
+        write_text(self.folder, self._path(identity.key, "json"), json.dumps(held, default=_plain))
 
     def environment(self, name: str) -> Mapping[str, str]:
         """A stored environment; empty when there is none of this name."""
@@ -155,12 +168,15 @@ class Parts:
         if name and not path.exists():
             write_text(self.folder, path, json.dumps(dict(environment), indent=1, ensure_ascii=False) + "\n")
 
-    def _path(self, key: str, name: str) -> Path:
-        return self.folder / CASES / f"{key}.{name}.parquet"
+    def _frame(self, key: str, name: str) -> Path:
+        return self._path(key, f"{name}.parquet")
+
+    def _path(self, key: str, ending: str) -> Path:
+        return self._cases / f"{key}.{ending}"
 
     def _listed(self) -> list[str]:
         try:
-            return [name for name in os.listdir(self.folder / CASES) if not name.startswith(".")]
+            return [name for name in os.listdir(self._cases) if not name.startswith(".")]
         except OSError:
             return []
 

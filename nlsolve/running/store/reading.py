@@ -185,7 +185,7 @@ def shown_of(study: Study, entries: Iterable[Entry]) -> str:
 
 
 def read_shown(folder: Path, digest: str) -> tuple[Frames, tuple[str, ...]] | None:
-    """The frames of all cases (`runs` as it was written) and the notes of a run after which `digest` was the same.
+    """The frames but `runs`, which the parts have, and the notes of a run after which `digest` was the same.
 
     None when it was not, or when a file that was written then is gone or damaged.
     """
@@ -193,8 +193,8 @@ def read_shown(folder: Path, digest: str) -> tuple[Frames, tuple[str, ...]] | No
         document = json.loads((folder / SHOWN).read_text(encoding="utf-8"))
         if document["digest"] != digest or not all((folder / name).is_file() for name in document["files"]):
             return None
-        runs, steps, fields = (pd.read_parquet(folder / f"{name}.parquet") for name in ("runs", "steps", "fields"))
-        return Frames(runs, steps, fields), tuple(document["notes"])
+        steps, fields = (pd.read_parquet(folder / f"{name}.parquet") for name in ("steps", "fields"))
+        return Frames(pd.DataFrame(), steps, fields), tuple(document["notes"])
     except (OSError, ValueError, TypeError, KeyError, ArrowException):
         return None
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections import defaultdict
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from nlsolve.contracts.status import Status
@@ -26,11 +26,13 @@ class Standing:
 
     word : KEPT, NEW, DAMAGED, TIMED, "retried (crashed)", or what has changed: "changed plugin honey 1.0 -> 1.1".
     entry : the part that stands, if its case is kept or timed again.
+    last : how the case ended last, even if its source or a file has changed since; None when nothing is known of it.
     """
 
     identity: Identity
     word: str
     entry: Entry | None = None
+    last: Entry | None = None
 
 
 class Standings:
@@ -53,41 +55,41 @@ class Standings:
         identity = identity_of(case)
         entry = self.parts.entry(identity.key)
         if entry is None:
-            return Standing(identity, self._why(identity))
-        run = entry.run({})
+            last = self._latest(self._keys.get(case.id, []))
+            return Standing(identity, self._why(identity, last), last=last)
+        run = {**entry.measured, **entry.parameters}
         if is_tried_again(run, case.parts.limits, self.retry) and entry.written < self.begun:
-            return Standing(identity, f"retried ({status_of(run).word})")
-        return Standing(identity, KEPT if has_rounds(run, self.timing) else TIMED, entry)
+            return Standing(identity, f"retried ({status_of(entry.measured).word})", last=entry)
+        return Standing(identity, KEPT if has_rounds(entry.measured, self.timing) else TIMED, entry, entry)
 
     def of_all(self, cases: Sequence[Case]) -> dict[str, Standing]:
-        """What the folder has of each case; in the exclusive lane the cases of a comparison are timed again together.
+        """What the folder has of each case, as `compared` has it."""
+        return self.compared(cases, {case.id: self.of(case) for case in cases})
 
-        They are while one of them has no part that stands, or too few rounds.
+    def compared(self, cases: Sequence[Case], found: Mapping[str, Standing]) -> dict[str, Standing]:
+        """What the folder has of each of these cases; in the exclusive lane the cases of a comparison are timed again
+        together.
+
+        They are while one of them has no part that stands, or too few rounds. found : what `of` tells of each.
         """
-        found = {case.id: self.of(case) for case in cases}
+        standing = {case.id: found[case.id] for case in cases}
         for members in comparisons(cases) if self.timing.is_exclusive else ():
-            known = {case.id: found[case.id].entry for case in members}
+            entries = {case.id: found[case.id].entry for case in members}
             timed = {
-                case: entry.run({})
-                for case, entry in known.items()
-                if entry is not None and is_compared(entry.run({}), self.timing)
+                case: entry.measured
+                for case, entry in entries.items()
+                if entry is not None and is_compared(entry.measured, self.timing)
             }
-            kept = all(found[case].word == KEPT for case in known)
+            kept = all(found[case].word == KEPT for case in entries)
             if not kept or not is_over(list(timed.values()), self.timing):
-                found |= {case: replace(found[case], word=TIMED) for case in timed if found[case].word == KEPT}
-        return found
+                standing |= {case: replace(found[case], word=TIMED) for case in timed if found[case].word == KEPT}
+        return standing
 
-    def last(self, case: Case) -> Entry | None:
-        """How a case ended last, even if its source or a file has changed since; None when nothing is known of it."""
-        entry = self.parts.entry(identity_of(case).key)
-        return entry if entry is not None else self._latest(self._keys.get(case.id, []))
-
-    def _why(self, identity: Identity) -> str:
+    def _why(self, identity: Identity, last: Entry | None) -> str:
         """Why no part stands for an identity: what has changed since the last part of its case, if there is one."""
         keys = self._keys.get(identity.case, [])
         if identity.key in keys:
             return DAMAGED
-        last = self._latest(keys)
         if last is None:
             return DAMAGED if keys else NEW
         return ", ".join(identity.changes_since(last.identity))

@@ -64,6 +64,7 @@ class Store:
         self._claims = Claims(folder)
         self._standings = Standings(self.parts, study.timing, retry)
         self._started: dict[str, float] = {}
+        self._arrived: dict[str, float] = {}
         self._begun: dict[str, Identity] = {case.id: identity_of(case) for case in study.cases}
         self.write_text(STUDY, json.dumps(describe(study, self._begun), ensure_ascii=False) + "\n")
 
@@ -89,8 +90,8 @@ class Store:
 
     def ending(self, case: Case) -> str:
         """The word of the status with which a case ended last, or `LEFT`."""
-        entry = self._standings.last(case)
-        return LEFT if entry is None else status_of(entry.measured).word
+        last = self._standings.of(case).last
+        return LEFT if last is None else status_of(last.measured).word
 
     def begin(self, case: Case) -> bool:
         """Claim a case, so that no other run computes it; False while another run has it."""
@@ -105,12 +106,17 @@ class Store:
         with self.writing():
             return self._claims.take(EXCLUSIVE)
 
+    def arrive(self, case: Case) -> None:
+        """A case that has begun has solved the way to its first state."""
+        self._arrived[case.id] = time.monotonic()
+
     def save(self, case: Case, part: Part) -> None:
         """Keep a part. It is not kept when a file that the case reads has changed since the case was looked up."""
         identity = identity_of(case)
         if identity == self._begun[case.id]:
-            elapsed = time.monotonic() - self._started.get(case.id, math.nan)
-            self.parts.save(identity, part, case.parameters, elapsed)
+            begun = self._started.get(case.id, math.nan) + part.startup
+            way = self._arrived.pop(case.id, begun) - begun
+            self.parts.save(identity, part, case.parameters, time.monotonic() - begun, way)
 
     def end(self, case: Case) -> None:
         """Give up the claim on a case."""

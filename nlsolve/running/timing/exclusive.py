@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
 from nlsolve.results.frames import Part
@@ -11,19 +11,41 @@ from nlsolve.running.engines.engine import Listener, Turn
 from nlsolve.running.store.store import Store
 from nlsolve.running.timing.rounds import comparisons, is_compared, is_over, rounds_of, with_round, without_rounds
 from nlsolve.running.turns import Turns
+from nlsolve.running.ways.ways import Ways
 from nlsolve.study.case import Case
 from nlsolve.study.study import Study
+
+
+class CountingTurns(Turns):
+    """Turns before those of the exclusive lane, side by side: how each case ends, its counts and its errors.
+
+    The folder keeps no way to a first state of theirs, as its seconds are to come from the lane.
+    """
+
+    def __init__(self, study: Study, store: Store | None, chosen: Sequence[Case] | None = None) -> None:
+        super().__init__(study, store, chosen)
+        self.ways = Ways(study.cases, None)
 
 
 class ExclusiveTurns(Turns):
     """Turns that are taken one at a time: the next is asked for when the last one has ended.
 
+    counted : case -> its part from `CountingTurns`; those that have not arrived need no turn.
+
     Of two runs on one folder the second waits for the end of the first. A comparison goes on where it was stopped; one
     to which a case has been added begins anew, so that all its cases have the same rounds.
     """
 
-    def __init__(self, study: Study, store: Store | None, chosen: Sequence[Case] | None = None) -> None:
+    def __init__(
+        self,
+        study: Study,
+        store: Store | None,
+        chosen: Sequence[Case] | None = None,
+        counted: Mapping[str, Part] | None = None,
+    ) -> None:
         super().__init__(study, store, chosen)
+        self.parts |= counted or {}
+        self._counted = [case.id for case in self.cases if counted and case.id in counted]
         self._comparisons = comparisons(self.cases)
         self._run: set[str] = set()
 
@@ -39,11 +61,13 @@ class ExclusiveTurns(Turns):
                 self._look_up(Turn(case, 0, 0))
         due = self._due()
         waiting = {case.id for case in due}
-        done = [case for case in self.cases if case.id not in waiting]
-        for number, case in enumerate(done, 1):
-            turn = Turn(case, number, len(done) + len(due))
+        told = {*waiting, *self._counted}
+        number = len(self._counted)
+        done = [case for case in self.cases if case.id not in told]
+        for case in done:
+            number += 1
+            turn = Turn(case, number, len(self._counted) + len(done) + len(due))
             tell(replace(turn.event(run=self.parts[case.id].run), resumed=True))
-        number = len(done)
         while due:
             of = number + len(due)
             for case in due:

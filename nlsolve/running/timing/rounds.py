@@ -12,7 +12,7 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from scipy.special import bdtr
+import scipy  # loads scipy.special when the first interval is asked for
 
 from nlsolve.results.columns import is_timed
 from nlsolve.results.costs.cost_prediction import UNITS
@@ -37,7 +37,7 @@ def interval(seconds: Sequence[float]) -> tuple[float, float]:
     7.1). NaN for fewer than FEWEST rounds.
     """
     n, ordered = len(seconds), sorted(seconds)
-    k = int(np.sum(2.0 * bdtr(np.arange(n), n, 0.5) <= 1.0 - CONFIDENCE))
+    k = int(np.sum(2.0 * scipy.special.bdtr(np.arange(n), n, 0.5) <= 1.0 - CONFIDENCE))
     return (ordered[k - 1], ordered[n - k]) if k else (np.nan, np.nan)
 
 

@@ -14,18 +14,6 @@ from nlsolve.solving.way import Way
 from nlsolve.study.case import Case
 
 
-def led(cases: Sequence[Case]) -> set[str]:
-    """The ids of the cases that take the way of an earlier one."""
-    seen: set[str] = set()
-    found: set[str] = set()
-    for case in cases:
-        if case.way_id in seen:
-            found.add(case.id)
-        elif case.way_id:
-            seen.add(case.way_id)
-    return found
-
-
 class Ways:
     """The ways of a study's cases, in memory and in its results folder (None: in memory only).
 

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import csv
 from contextlib import redirect_stderr, redirect_stdout
+from importlib import import_module
+from importlib.util import find_spec
 from io import StringIO
 from pathlib import Path
 from typing import Any, Literal
@@ -12,11 +14,6 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 
 from nlsolve.plugin import Cloud, InputFile, SolveError, Status
-
-try:
-    import meshio
-except ImportError:  # an extra: nlsolve[mesh]
-    meshio = None
 
 HEADER = ["x", "y", "group"]
 LONGEST = 60  # characters of a wrong line that a sentence repeats
@@ -96,12 +93,12 @@ def _row(path: Path, line: int, values: list[str]) -> tuple[float, float, str]:
 
 def _from_mesh(path: Path, needed: tuple[str, ...]) -> tuple[np.ndarray, dict[str, np.ndarray]]:
     """Nodes (N, 2) and groups of a mesh: the points of its faces, or all of them where it has none."""
-    if meshio is None:
+    if find_spec("meshio") is None:  # an extra: nlsolve[mesh]
         raise _bad(f"reading {path} needs meshio: pip install 'nlsolve[mesh]'")
     said = StringIO()
     try:
         with redirect_stdout(said), redirect_stderr(said):  # meshio prints the reason, then exits
-            mesh = meshio.read(path)
+            mesh = import_module("meshio").read(path)  # not imported above: few studies read a mesh
     except (Exception, SystemExit) as error:
         reason = " ".join(said.getvalue().split()) or f"{type(error).__name__}: {error}"
         raise _bad(f"{path}: meshio cannot read it: {reason}") from error

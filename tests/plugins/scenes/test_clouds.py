@@ -373,7 +373,7 @@ def test_a_mesh_off_its_plane_is_refused(tmp_path: Path) -> None:
 
 
 def test_without_meshio_a_mesh_says_how_to_get_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(files, "meshio", None)
+    monkeypatch.setattr(files, "find_spec", lambda name: None)
     path = tmp_path / "annulus.msh"
     path.touch()
     with pytest.raises(SolveError, match=r"reading .*annulus\.msh needs meshio: pip install 'nlsolve\[mesh\]'"):

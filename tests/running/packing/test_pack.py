@@ -9,26 +9,13 @@ from zipfile import ZipFile
 
 import pandas as pd
 import pytest
+from fakes import solver_text
 from typer.testing import CliRunner
 
 import nlsolve
 from nlsolve.cli.app import app
 from nlsolve.running.packing.study_files import StudyFiles
 
-PLUGIN = """
-from typing import Literal
-from nlsolve.plugin import NonlinearSolver, Step
-
-class {name}(NonlinearSolver):
-    kind: Literal["{kind}"] = "{kind}"
-
-    def steps(self, problem, tangent, start):
-        state = start
-        while True:
-            yield Step(state)
-            tangent.refresh_if_due(lambda: problem.jacobian(state))
-            state = state - tangent.solve(problem.residual(state))
-"""
 BASE = 'scene = { kind = "published", problem = "powell-singular" }\n'
 STUDY = """question = "Do they run elsewhere?"
 extends = "../shared/base.toml"
@@ -50,7 +37,7 @@ def here(tmp_path, monkeypatch) -> Path:
     (tmp_path / "here" / "shared").mkdir()
     places = {"one": "shared/one.py", "two": "studies/two.py", "three": "three.py", "four": "studies/four.py"}
     for kind, file in places.items():
-        (tmp_path / "here" / file).write_text(PLUGIN.format(name=kind.capitalize(), kind=kind), encoding="utf-8")
+        (tmp_path / "here" / file).write_text(solver_text(kind), encoding="utf-8")
     (tmp_path / "here" / "shared" / "base.toml").write_text(BASE, encoding="utf-8")
     (place / "study.toml").write_text(STUDY, encoding="utf-8")
     monkeypatch.chdir(place)

@@ -10,27 +10,9 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from fakes import solver_text
 
-PLAIN = """
-from typing import Literal
-from nlsolve.plugin import NonlinearSolver, Step, hookimpl
-
-
-class Plain(NonlinearSolver):
-    kind: Literal["plain"] = "plain"
-
-    def steps(self, problem, tangent, start):
-        state = start
-        while True:
-            yield Step(state)
-            tangent.refresh_if_due(lambda: problem.jacobian(state))
-            state = state - tangent.solve(problem.residual(state))
-
-
-@hookimpl
-def nlsolve_components():
-    return [Plain]
-"""
+PLAIN = solver_text("plain")
 EDITED = PLAIN.replace("state - tangent", "state - 0.9 * tangent")
 
 STUDY = """

@@ -7,16 +7,13 @@ import subprocess
 import sys
 from importlib import import_module
 from pathlib import Path
-from typing import Literal
 
 import pytest
 from fakes import COMPONENTS, Honey, registry_of, write_study
-from pydantic import BaseModel
 
 import nlsolve
-from nlsolve.plugin import InputFile
 from nlsolve.running.store import sources
-from nlsolve.running.store.identity import MISSING, Identity, files_read, identity_of
+from nlsolve.running.store.identity import MISSING, Identity, identity_of
 from nlsolve.running.store.sources import NUMERICS, numerics, sources_of
 from nlsolve.study.study import Study
 
@@ -169,19 +166,6 @@ def test_numerics_are_there_and_an_edit_elsewhere_is_none_of_them(tmp_path):
     with (copy / "solving" / "driver.py").open("a", encoding="utf-8") as file:
         file.write("\n# edited\n")
     assert told() != numerics()
-
-
-class Reader(BaseModel):
-    """Fields that name files, and one that does not."""
-
-    kind: Literal["reader"] = "reader"
-    nodes: InputFile = "nodes.csv"
-    mesh: Path = Path("a.msh")
-    word: str = "nodes.csv"
-
-
-def test_files_are_the_fields_that_say_so():
-    assert list(files_read(Reader())) == [Path("nodes.csv"), Path("a.msh")]
 
 
 def test_an_edited_file_is_another_case(tmp_path, monkeypatch):

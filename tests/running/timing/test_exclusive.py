@@ -339,6 +339,25 @@ def test_where_there_is_one_core_only_a_note_says_so(monkeypatch):
     os.sched_setaffinity(0, mine)
 
 
+def test_several_cases_at_a_time_are_counted_first_and_those_that_arrive_timed_alone(tmp_path):
+    """What does not arrive is run once, beside others; the folder has nothing that was counted twice."""
+    told: list[Event] = []
+    methods = ({"kind": "newton"}, {"kind": "modified-newton"}, planted.Raises())
+    results = run(document(*methods, most_rounds=7), tmp_path, listen=told.append, isolation="process", jobs=2)
+    assert results.runs["lane"].tolist()[:2] == ["exclusive"] * 2
+    assert results.runs["rounds"].tolist()[:2] == [7, 7]
+    assert results.runs["status"].tolist() == ["converged", "converged", "crashed"]
+    ended = [event for event in told if event.run is not None]
+    assert [event.run["lane"] for event in ended if event.run is not None and "lane" in event.run] == (
+        ["shared"] * 2 + ["exclusive"] * 14
+    )
+    assert sorted(event.number for event in ended) == list(range(1, 18))
+    alone = run(document(*methods[:2], most_rounds=7), isolation="process").runs
+    assert alone["factorizations"].tolist() == results.runs["factorizations"].tolist()[:2]
+    again = run(document(*methods[:2], most_rounds=7), tmp_path, isolation="process", jobs=2)
+    assert again.runs["seconds"].tolist() == results.runs["seconds"].tolist()[:2], "nothing is left to count or to time"
+
+
 def test_a_component_of_the_running_script_is_not_in_the_lane(monkeypatch):
     monkeypatch.setattr(planted.Sound, "__module__", "__main__")
     results = run(document({"kind": "newton"}, planted.Sound()), isolation="process")
@@ -352,7 +371,6 @@ def test_a_component_of_the_running_script_is_not_in_the_lane(monkeypatch):
 @pytest.mark.parametrize(
     ("wishes", "named"),
     [
-        ({"jobs": 2}, "jobs = 2"),
         ({"isolation": "none"}, "isolation = 'none'"),
         ({"engine": "dask"}, "engine = 'dask'"),
         ({"debugger": print, "isolation": None}, "a debugger"),

@@ -20,7 +20,7 @@ from nlsolve.running.planning.plan import plan_of
 from nlsolve.running.store.identity import way_of
 from nlsolve.running.store.upkeep import superfluous
 from nlsolve.running.ways.files import read_way, way_path, write_way
-from nlsolve.running.ways.ways import Ways, led
+from nlsolve.running.ways.ways import Ways
 from nlsolve.solving.way import Stretch, Way
 from nlsolve.study.study import Study
 
@@ -116,7 +116,6 @@ def test_cases_share_a_way_where_only_their_methods_differ(study: Study) -> None
 
 
 def test_a_plan_counts_the_way_once(study: Study, tmp_path: Path) -> None:
-    assert led(study.cases) == {case.id for case in study.cases[1:]}
     frame = plan_of(study, tmp_path).cases
     assert frame["seconds_start"].nunique() == 1
     first, *others = frame["seconds_expected"]

@@ -59,14 +59,18 @@ class Keeper:
         Raises InputError when no worker can be started.
         """
         for last in (False, True):
+            begun, is_new = _now(), self.worker is None
             worker = self._started()
             if worker is None:
                 return None
+            waited = _now() - begun
             worker.begin()
             worker.send(task)
             found = self._watched(worker, task, known, tell)
             if worker.gone and found is None and not self.ending.is_set():
                 found = self._died(worker, task, known, last)
+            if isinstance(found, Part):
+                found = replace(found, startup=waited + found.startup if is_new else 0.0)
             if found is not None or self.ending.is_set():
                 return found
         raise AssertionError("a task has an ending")
@@ -111,7 +115,7 @@ class Keeper:
                 output = worker.output
                 if stopped or answer.changed or worker.resident() > task.limits.bytes / 2:
                     self.drop()
-                return replace(answer.part, output=output)
+                return replace(answer.part, output=output, startup=answer.imported)
             elif worker.gone:
                 return None
             elif _now() - looked < TICK / 2:  # it has printed something

@@ -85,10 +85,12 @@ class Ended:
     """A case has ended.
 
     changed : what it has left changed in its process, which must not serve another case; empty: nothing.
+    imported : how long its components took to be imported [s].
     """
 
     part: Part
     changed: str
+    imported: float = 0.0
 
 
 @dataclass(frozen=True)

@@ -97,9 +97,11 @@ class Worker:
         """
         before, parts = Surroundings(), Sections()
         self.task, self.origins, self.told = task, {}, 0.0
+        begun, imported = _now(), 0.0
         try:
             _allow(task.limits.bytes)
             parts = task.parts()
+            imported = _now() - begun
             self.origins = origins(parts)
             part = self.run(task, parts)
             if task.lane == EXCLUSIVE and task.case not in self.warm and is_compared(part.run, task.timing):
@@ -116,7 +118,7 @@ class Worker:
             _exit(0)
         for stream in (sys.stdout, sys.stderr):
             stream.flush()
-        return Ended(_doubted(part, before.doubt()), before.changed())
+        return Ended(_doubted(part, before.doubt()), before.changed(), imported)
 
     def run(self, task: Task, parts: Sections) -> Part:
         """One run of a case."""
