@@ -18,7 +18,18 @@ import nlsolve.plugin
 HOUSE = Path(nlsolve.__file__).parent
 PLUGINS = HOUSE.parent / "plugins"
 MOST_ENTRIES, MOST_FILES = 15, 10
-LIBRARIES = {"nlsolve", "numpy", "scipy", "pydantic", "meshio", "rslab", "mpi4py", "petsc4py", "sundials4py"}
+LIBRARIES = {
+    "nlsolve",
+    "numpy",
+    "scipy",
+    "pydantic",
+    "meshio",
+    "pymklpardiso",
+    "rslab",
+    "mpi4py",
+    "petsc4py",
+    "sundials4py",
+}
 PROMISE = re.compile(r"\bmay import ([a-z, ]+?)\.", re.DOTALL)
 DOORS = {"__init__", "plugin"}
 MODULES = sorted(HOUSE.rglob("*.py"))

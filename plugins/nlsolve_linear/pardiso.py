@@ -24,8 +24,8 @@ except ImportError:  # an extra: nlsolve[pardiso]
 ABSENT = "needs the library py-mkl-pardiso, for x86-64 only: pip install 'nlsolve[pardiso]'"
 
 # PARDISO's parameters, counted from zero. Dissection by METIS; pivots below 10⁻¹³ of the norm are perturbed; scaling
-# and matching for LU, pivots of Bunch & Kaufman (1977) for LDLᵀ; the entries of the factors are counted. No refinement: the
-# ledger refines.
+# and matching for LU, pivots of Bunch & Kaufman (1977) for LDLᵀ; the entries of the factors are counted. No
+# refinement: the ledger refines.
 PARAMETERS: dict[str, dict[int, int]] = {
     "lu": {1: 2, 9: 13, 10: 1, 12: 1, 17: -1},
     "ldlt": {1: 2, 9: 13, 17: -1, 20: 1},
