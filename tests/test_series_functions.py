@@ -200,7 +200,7 @@ ENDS: list[tuple[Callable[[Any], Any], float, str]] = [
 ]
 
 
-@pytest.mark.parametrize(("function", "value", "sentence"), ENDS, ids=lambda value: str(value)[:40])
+@pytest.mark.parametrize(("function", "value", "sentence"), ENDS, ids=[sentence for _, _, sentence in ENDS])
 @pytest.mark.filterwarnings("ignore::RuntimeWarning")
 def test_where_a_function_ends_its_value_stands_and_its_slope_is_refused_by_name(
     function: Callable[[Any], Any], value: float, sentence: str
