@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from nlsolve.algebra.system import System
 from nlsolve.contracts.component import Component, InputFile
-from nlsolve.contracts.continuum.cloud import Cloud, Exact
+from nlsolve.contracts.continuum.cloud import Cloud, Exact, hat_gradients
 from nlsolve.contracts.continuum.discretizer import Discretizer, Operators, PointOperators
 from nlsolve.contracts.continuum.law import ConstitutiveLaw, PowerForm, local_index, stress, tangent_moduli
 from nlsolve.contracts.continuum.terms import NodeMotion, Physics, Recording, TimeSteps
@@ -82,6 +82,7 @@ __all__ = [
     "Workload",
     "as_column",
     "cached_jacobian",
+    "hat_gradients",
     "hookimpl",
     "local_index",
     "norm",

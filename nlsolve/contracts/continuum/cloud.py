@@ -78,3 +78,13 @@ class Exact:
 def node_major(nodes: Indices) -> Indices:
     """Indices 2 i, 2 i + 1 of the velocity components of `nodes`."""
     return np.stack([2 * nodes, 2 * nodes + 1], axis=1).ravel()
+
+
+def hat_gradients(nodes: Array, corners: Indices) -> Array:
+    """A ∇φ (T, 3, 2) [mm]: the triangles' areas times the gradients of the linear hat functions of their `corners`.
+
+    nodes : (N, 2) [mm].
+    corners : (T, 3), counter-clockwise.
+    """
+    ahead, behind = nodes[corners[:, [1, 2, 0]]], nodes[corners[:, [2, 0, 1]]]
+    return 0.5 * np.stack([ahead[..., 1] - behind[..., 1], behind[..., 0] - ahead[..., 0]], axis=-1)

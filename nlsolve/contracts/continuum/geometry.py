@@ -18,8 +18,8 @@ class Geometry(Component, ABC):
     keeps_nodes: ClassVar[str | None] = None
     """Why nodes must stay where they are, such as "material leaves the channel"; None when they may move."""
     moving_wall: ClassVar[str | None] = None
-    """Name of the boundary group inside the contour. A conservative form computes force and torque at its nodes, a
-    strong form on the contour. None: every form computes them on the contour.
+    """Name of the boundary group inside the contour, at whose nodes force and torque are computed. None: they are
+    computed on the contour.
     """
 
     @property

@@ -17,7 +17,7 @@ import numpy as np
 import scipy
 import scipy.sparse as sp
 
-from nlsolve.plugin import Cloud, PointOperators, SolveError, Status
+from nlsolve.plugin import Cloud, PointOperators, SolveError, Status, hat_gradients
 
 
 @dataclass(frozen=True)
@@ -138,8 +138,7 @@ class Triangles:
     @cached_property
     def hat_gradients(self) -> np.ndarray:
         """∇ of the linear hat function of each corner times the triangle's area, (T, 3, 2) [mm]."""
-        ahead, behind = self.cloud.nodes[self.corners[:, [1, 2, 0]]], self.cloud.nodes[self.corners[:, [2, 0, 1]]]
-        return 0.5 * np.stack([ahead[..., 1] - behind[..., 1], behind[..., 0] - ahead[..., 0]], axis=-1)
+        return hat_gradients(self.cloud.nodes, self.corners)
 
     @cached_property
     def node_areas(self) -> np.ndarray:
@@ -186,7 +185,7 @@ class Patches:
         inside = self.triangles.cloud.interior
         free = np.stack([2 * inside, 2 * inside + 1], axis=1).ravel()
         per_area = sp.diags_array(-1.0 / np.repeat(self.triangles.node_areas[inside], 2))
-        return PointOperators(self.dilatation, (per_area @ self.net_flux[:, free].T).tocsr(), self.centres)
+        return PointOperators(self.dilatation, (per_area @ self.net_flux[:, free].T).tocsr(), self.centres, self.areas)
 
     def conservative(self) -> PointOperators:
         """S_θ = −B_θᵀ A (2F, L) at the interior nodes."""
