@@ -36,7 +36,7 @@ DISCRETIZERS: tuple[Table, ...] = (
     {"kind": "mls", "points": "nodes"},
     {"kind": "mls", "form": "conservative"},
     {"kind": "mls", "degree": 1},
-    {"kind": "rbf"},
+    {"kind": "rbf", "form": "strong"},
     {"kind": "rbf", "form": "conservative"},
     {"kind": "delaunay"},
 )

@@ -34,7 +34,7 @@ WRONG, RIGHT = 0.05, 0.02
 DISCRETIZERS: dict[str, dict[str, Any]] = {
     "mls": {"kind": "mls"},
     "mls, conservative": {"kind": "mls", "form": "conservative"},
-    "rbf": {"kind": "rbf"},
+    "rbf": {"kind": "rbf", "form": "strong"},
     "delaunay": {"kind": "delaunay"},
 }
 RINGS = [

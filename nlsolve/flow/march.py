@@ -204,6 +204,7 @@ class FlowSimulation(Simulation):
         if state.flow is None:
             return found
         flow, velocity, time = state.flow, state.flow.velocity(state.unknowns), self.reached
+        found["form"] = "conservative" if flow.operators.is_conservative else "strong"
         change = None if self.before is None else (velocity - self.before) / parts.time.increment
         if parts.motion.accumulates:
             found["rate_drift"] = rate_drift(flow, state.unknowns)

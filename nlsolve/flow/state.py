@@ -47,6 +47,7 @@ class FlowState:
     """The present time, nodes, operators and pressure of a case, and the state that was solved last.
 
     time : the present time [s].
+    discretizer : that of the case, with what it leaves open chosen for the law.
     cloud : the nodes at that time.
     operators, gradient : B, S, B_θ and S_θ of these nodes; ∂/∂x and ∂/∂y, or None without convection.
     pressure : p at the volume points, shape (L,) [MPa]; None until it has been iterated.
@@ -59,6 +60,7 @@ class FlowState:
 
     def __init__(self, parts: FlowParts, entry: Entry) -> None:
         self.parts, self.scene, self.entry = parts, parts.scene, entry
+        self.discretizer = parts.discretizer.for_law(parts.law, parts.scene.reference_rate)
         self.volumetric = bool(parts.physics.penalty)
         self.time = 0.0
         self.pressure: Array | None = None
@@ -75,7 +77,7 @@ class FlowState:
         self.cloud = cloud
         if self.parts.motion.moving:
             self.moving = MovingNodes(
-                self.parts.scene, self.parts.motion, self.parts.time.increment, self.parts.discretizer, cloud
+                self.parts.scene, self.parts.motion, self.parts.time.increment, self.discretizer, cloud
             )
         self.build_operators()
         self.velocity = self.guess = np.zeros_like(cloud.nodes)
@@ -118,7 +120,7 @@ class FlowState:
         before = self.operators if self.pressure is not None else None
         with self.entry("operators"):
             if self.moving is None:
-                self.operators = self.parts.discretizer.operators(self.cloud, self.volumetric)
+                self.operators = self.discretizer.operators(self.cloud, self.volumetric)
             else:
                 self.operators = self.moving.operators(self.cloud, self.volumetric)
             self.gradient = self.parts.discretizer.gradient(self.cloud) if self.parts.physics.convection else None

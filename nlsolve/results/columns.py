@@ -64,6 +64,7 @@ RUNS = _by_name(
     Column("nodes", "N, nodes of the cloud"),
     Column("unknowns", "U, unknown velocity components, or unknowns of a system"),
     Column("smallest_spacing", "smallest distance between two nodes at t = 0", "mm"),
+    Column("form", "form of the operators that a flow was solved with: strong or conservative"),
     Column(
         "cloud_quality",
         "moving nodes: least distance of a node to its nearest over that distance at t = 0, over the march",

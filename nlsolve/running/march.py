@@ -72,7 +72,8 @@ class March:
         initial = parts.scene.cloud(parts.law)
         cloud, moment = initial.moved_to(self.nodes[k]), float(self.times[k])
         wall = parts.scene.boundary_velocity(cloud, parts.law, moment)
-        flow = Flow(cloud, parts.discretizer.operators(cloud, False), parts.law, wall)
+        discretizer = parts.discretizer.for_law(parts.law, parts.scene.reference_rate)
+        flow = Flow(cloud, discretizer.operators(cloud, False), parts.law, wall)
         return nodal_fields(parts.scene, parts.discretizer, flow, self.velocities[k], initial, moment)
 
     def _reached(self, caller: str, time: float) -> float:

@@ -37,7 +37,7 @@ class Collocation(Discretizer):
     """
 
     points: Literal["between", "nodes"] = Field("between", description="where strain rates and stresses are taken")
-    form: Literal["strong", "conservative"] = Field("strong", description="how stresses act on the nodes")
+    form: Literal["strong", "conservative"] | None = Field("strong", description="how stresses act on the nodes")
     volume_points: Literal["pairs", "nodes"] = Field("pairs", description="where the dilatation is taken")
     degree: int = Field(2, ge=1, le=4, description="degree of the polynomials")
     balanced: bool = Field(True, description="supports grow until every quadrant that has nodes nearby is served")

@@ -25,7 +25,7 @@ import scipy.sparse as sp
 
 from nlsolve.contracts.component import Component
 from nlsolve.contracts.continuum.cloud import Cloud, node_major
-from nlsolve.contracts.continuum.law import CONTRACTION
+from nlsolve.contracts.continuum.law import CONTRACTION, ConstitutiveLaw
 from nlsolve.series import Array
 
 
@@ -36,7 +36,7 @@ class PointOperators:
     rate : B, values at the nodes -> rates at the points, sparse (c P, 2N).
     force : S, stresses there -> force at the interior nodes, sparse (2F, c P).
     points : places of the points, (P, 2) [mm].
-    areas : A, areas of the points in a conservative form, (P,) [mm²]; None in a strong form.
+    areas : A, areas of the points, (P,) [mm²]; strain points have them in a conservative form only.
     """
 
     rate: Any
@@ -52,7 +52,7 @@ class PointOperators:
         return cls(rate, (-(rate[:, free].T @ weighed)).tocsr(), points, areas)
 
     def weights(self) -> Array:
-        """The diagonal of A, (c P,) [mm²], xy counted twice; in a conservative form only."""
+        """The diagonal of A, (c P,) [mm²], xy counted twice; for points with areas only."""
         assert self.areas is not None
         return _weights(self.areas, self.rate.shape[0] // len(self.points))
 
@@ -94,6 +94,10 @@ class Discretizer(Component, ABC):
     """Table of the discretizer that solves the flow on an enriched cloud, to estimate the error of this one's solutions
     when a study names none. None: no estimate.
     """
+
+    def for_law(self, law: ConstitutiveLaw, rate: float) -> Discretizer:
+        """This discretizer, with what it leaves open chosen for a law at strain rates of about `rate` [1/s]."""
+        return self
 
     @abstractmethod
     def operators(self, cloud: Cloud, volumetric: bool) -> Operators:

@@ -48,7 +48,7 @@ def spin(nodes: Any = GRADED) -> StirringTool:
         (spin(), 0.3, MovingLeastSquares(), {}),
         (spin(), 0.1324, MovingLeastSquares(support=15, force_support=18), {}),
         (spin(), 0.1324, MovingLeastSquares(degree=1), {}),
-        (spin(), 0.1324, RadialBasis(), {}),
+        (spin(), 0.1324, RadialBasis(form="strong"), {}),
         (spin(), 0.1324, TRIANGLES, {}),
         (spin(Rings(spacing=0.75)), 1.0, MovingLeastSquares(points="nodes"), {}),
         (spin(), 0.3, MovingLeastSquares(), {"physics": Physics(penalty=1e4)}),

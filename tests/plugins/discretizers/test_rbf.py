@@ -6,15 +6,20 @@ from typing import Any
 
 import numpy as np
 import pytest
+from cases import setup
 from clouds import CLOUDS, jittered_points
 from nlsolve_discretizers import MovingLeastSquares, RadialBasis
 from nlsolve_discretizers.collocation import GRADIENT
 from nlsolve_discretizers.weights.least_squares import monomials
 from nlsolve_discretizers.weights.radial import interpolate, kernel
 from nlsolve_discretizers.weights.supports import Supports
+from nlsolve_laws import PowerLaw
+from nlsolve_scenes import StirringTool
+from nlsolve_scenes.nodes.rings import Auto
 
 from nlsolve import SolveError, Status
 from nlsolve.series import Array
+from nlsolve.solving.simulate import run_case as march
 
 KERNELS: dict[str, tuple[Any, Any]] = {
     "phs 3": (kernel("phs", 3, 0.0), lambda r: r**3),
@@ -154,3 +159,28 @@ def test_phs_and_least_squares_agree_on_smooth_fields() -> None:
     inside = cloud.interior
     for one, other in zip(RadialBasis().gradient(cloud), MovingLeastSquares().gradient(cloud), strict=True):
         assert np.abs((one - other) @ field)[inside].max() < 0.02
+
+
+# The form.
+
+
+@pytest.mark.parametrize(("index", "form"), [(1.0, "strong"), (0.3, "strong"), (0.2, "conservative")])
+def test_the_form_that_is_absent_follows_the_index(index: float, form: str) -> None:
+    law = PowerLaw(index=index)
+    assert RadialBasis().for_law(law, 100.0).form == form
+    for given in ("strong", "conservative"):
+        assert RadialBasis(form=given).for_law(law, 100.0).form == given
+
+
+def test_small_indices_are_solved_by_the_default_form_and_not_by_the_strong_one() -> None:
+    """The row says which form it was."""
+    law = PowerLaw(index=0.05, regularization=1e-3)
+    scene = StirringTool(nodes=Auto(resolution=2.0, growth=0.3, spacing=0.5))
+    absent, strong = (
+        march(setup(scene, discretizer=discretizer, law=law)).summary
+        for discretizer in (RadialBasis(), RadialBasis(form="strong"))
+    )
+    assert (absent["form"], absent["status"]) == ("conservative", "converged")
+    assert absent["torque_error"] < 0.01
+    assert strong["form"] == "strong"
+    assert strong["status"] != "converged"
