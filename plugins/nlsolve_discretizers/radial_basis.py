@@ -18,8 +18,8 @@ AT_BOUNDARIES = 1.5  # neighbours of a target near a boundary node, over those o
 
 LEAST_STRONG = 0.25
 """Index below which the default form is conservative. Weights that interpolate leave the strong form's tangent on the
-steady spin with eigenvalues of negative real part (3 at n = 0.1324 on 1,436 nodes, where moving least squares have none), of
-which Newton's method stagnates: on every cloud tried at n = 0.05, on some at n = 0.1324, on none at n = 0.3.
+steady spin with eigenvalues of negative real part (3 at n = 0.1324 on 1,436 nodes, where moving least squares have
+none), of which Newton's method stagnates: on every cloud tried at n = 0.05, on some at n = 0.1324, on none at n = 0.3.
 """
 
 
