@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from nlsolve.cli.endings import ending
+from nlsolve.cli.endings import ExitCode, ending
 from nlsolve.cli.options import (
     Disabled,
     Json,
@@ -20,13 +20,13 @@ from nlsolve.cli.options import (
     checked_study,
     default_folder,
 )
-from nlsolve.cli.printing import count, print_endings, print_table, say
+from nlsolve.cli.printing import count, print_endings, print_included, print_table, say
 from nlsolve.registry.problems import StudyError, did_you_mean
 from nlsolve.results.parameters import differing_parameters
 from nlsolve.running.packing.pack import export as packed
 from nlsolve.running.store.reading import FolderStatus, read_tables, status_of_folder
 from nlsolve.running.store.upkeep import merge_folders, remove, superfluous
-from nlsolve.show.tables import built
+from nlsolve.show.tables import built, included_tables
 
 folders = typer.Typer()
 
@@ -38,8 +38,16 @@ def table(
     folder: Folder,
     name: Annotated[str | None, typer.Argument(help="one declared table; default: all")] = None,
     as_json: Json = False,
+    check: Annotated[
+        Path | None,
+        typer.Option(metavar="PAPER.tex", help="tell instead whether the tables that a paper includes are stale"),
+    ] = None,
 ) -> None:
-    """Print the declared tables of a results folder, or the endings if there are none, of whatever is finished."""
+    """Print the declared tables of a results folder, or the endings if there are none, of whatever is finished.
+
+    With --check, tell of each table that PAPER.tex includes whether it says what the results say now; exit code 3 when
+    one does not.
+    """
     with ending():
         described, runs = read_tables(folder)
         names = [spec.name for spec in described.tables]
@@ -48,10 +56,18 @@ def table(
         tables, refused = built([spec for spec in described.tables if name in (None, spec.name)], runs)
         if name is not None and refused:
             raise StudyError(*refused)
+        if check is not None:
+            digests = {table.spec.name: table.grid().digest for table in tables}
+            included = [each for each in included_tables(check, described.name, digests) if name in (None, each.table)]
     if len(runs) < len(described.cases):
         say(f"{folder}: {len(runs)} of {count(len(described.cases))} are finished")
     for sentence in refused:
         say(sentence)
+    if check is not None:
+        print_included(included, folder, as_json)
+        if any(each.reason for each in included):
+            raise typer.Exit(ExitCode.NOT_FOUND)
+        return
     if as_json:
         typer.echo(json.dumps({table.spec.name: table.long() for table in tables}))
         return

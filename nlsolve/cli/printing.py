@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import json
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
+from pathlib import Path
 from typing import Any
 
 import pandas as pd
@@ -22,7 +23,7 @@ from nlsolve.results.verdicts import doubt, number, status_of
 from nlsolve.running.retry import is_final
 from nlsolve.running.runner import Results
 from nlsolve.running.store.reading import output_file
-from nlsolve.show.tables import Table
+from nlsolve.show.tables import Included, Table
 from nlsolve.study.study import Study
 
 MOST_RULED_ROWS, MOST_RULED_COLUMNS, MOST_RULED_CELLS = 500, 40, 5000
@@ -86,6 +87,17 @@ def print_table(table: Table) -> None:
         return
     for printed in table.rich():
         stdout().print(printed)
+
+
+def print_included(included: Sequence[Included], folder: Path, as_json: bool) -> None:
+    """Print of each table that a paper includes whether it says what the results in a folder say."""
+    if as_json:
+        rows = [{"file": str(each.file), "table": each.table, "reason": each.reason} for each in included]
+        typer.echo(json.dumps(rows))
+        return
+    for each in included:
+        way_out = f"; a fresh one is {folder / 'tables' / each.table}.tex after nlsolve run" if each.reason else ""
+        typer.echo(f"{each.file}: table {each.table}: {each.reason or 'as the results say'}{way_out}")
 
 
 def _is_large(frame: pd.DataFrame) -> bool:

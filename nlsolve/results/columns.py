@@ -18,6 +18,7 @@ class Column:
     symbol : what an axis calls the column, in TeX mathematics or in words; empty: its name with spaces.
     relative_error : whether it is a relative error, which people read in percent.
     timed : whether it was read from a clock while the case ran.
+    figures : significant figures of it that a paper prints.
     """
 
     name: str
@@ -26,6 +27,7 @@ class Column:
     symbol: str = ""
     relative_error: bool = False
     timed: bool = False
+    figures: int = 3
 
 
 def _by_name(*columns: Column) -> Mapping[str, Column]:
@@ -159,26 +161,33 @@ RUNS = _by_name(
         symbol="factorisation / triangular solve",
         timed=True,
     ),
-    Column("condition", "estimate of ‖K*‖₁ ‖K*⁻¹‖₁ for the last tangent, where the linear solver can tell"),
+    Column("condition", "estimate of ‖K*‖₁ ‖K*⁻¹‖₁ for the last tangent, where the linear solver can tell", figures=2),
     Column(
         "residual_norm",
         "largest relative residual accepted in any increment, evaluated outside the method; of a system |F_i| over the "
         "size of what cancels in equation i, largest over the equations",
         symbol="relative residual",
+        figures=2,
     ),
     Column(
         "newton_correction",
         "of a problem without a scale of its own: max_j |Δu_j| over the size of u_j, Δu the Newton correction at the "
         "end, evaluated outside the method; NaN where the residual alone told that it is not solved",
         symbol="Newton correction",
+        figures=2,
     ),
     Column(
         "residual_absolute",
         "largest ‖R‖₂ accepted in any increment, in the unit of the problem: N/mm³ for a flow, N/mm in a conservative "
         "form of it",
         symbol=r"$\|R\|_2$",
+        figures=2,
     ),
-    Column("divergence", "‖div V‖/‖ε̄‖ over volume points and strain points at the end, with a volumetric term"),
+    Column(
+        "divergence",
+        "‖div V‖/‖ε̄‖ over volume points and strain points at the end, with a volumetric term",
+        figures=2,
+    ),
     Column(
         "velocity_error",
         "relative ℓ² error of the velocities of all nodes at the end, where there is an exact solution",

@@ -3,13 +3,29 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from types import MappingProxyType
 
 import pandas as pd
 
-from nlsolve.results.columns import is_measured
+from nlsolve.results.columns import Column, is_measured
 
 VARIANT = "variant"
 """Column of `runs` with the names of the settings a case was made by, where a sweep of named settings has no name."""
+
+LETTERS: Mapping[str, Column] = MappingProxyType(
+    {
+        column.name: column
+        for column in (
+            Column("solver.order", "order of a series", symbol="order $p$"),
+            Column("solver.tolerance", "tolerance of a method's own test or range", symbol=r"tolerance $\eta$"),
+            Column("law.index", "index of a power law", symbol="index $n$"),
+            Column("law.regularization", "rate at which a law is regularised", "1/s", r"$\varepsilon_0$"),
+            Column("physics.penalty", "second viscosity over the viscosity at a rate", symbol=r"$\lambda/\mu$"),
+            Column("time.increment", "time step", "s", r"$\Delta t$"),
+        )
+    }
+)
+"""Parameters for which papers have a letter."""
 
 
 def names_settings(column: str) -> bool:

@@ -23,16 +23,19 @@ class PublishedValues(Component):
     )
     tolerance: float = Field(0.25, gt=0, description="relative difference that still counts as the same value")
 
-    def compare(self, cells: NDArray[Any], text: Callable[[Any], str]) -> list[list[str]]:
-        """ "measured (paper) verdict" for cells (rows, columns) of numbers, of words where a run failed, or of NaN."""
+    def compare(self, cells: NDArray[Any], text: Callable[[Any, int], str]) -> list[list[str]]:
+        """ "measured (paper) verdict" for cells (rows, columns) of numbers, of words where a run failed, or of NaN.
+
+        text : value, number of its column -> text.
+        """
         paper = np.array(self.values)
         measured = np.array([[np.nan if isinstance(cell, str) else cell for cell in row] for row in cells], dtype=float)
 
         def words(i: int, j: int) -> str:
-            ours = text(cells[i, j])
+            ours = text(cells[i, j], j)
             if np.isnan(paper[i, j]):
                 return ours
-            return f"{ours} ({text(paper[i, j])}) {verdict(measured, paper, i, j, self.tolerance)}"
+            return f"{ours} ({text(paper[i, j], j)}) {verdict(measured, paper, i, j, self.tolerance)}"
 
         return [[words(i, j) for j in range(paper.shape[1])] for i in range(paper.shape[0])]
 

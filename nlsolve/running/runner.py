@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import shlex
 import time
 from collections.abc import Collection, Mapping
 from contextlib import closing
 from dataclasses import dataclass, replace
+from datetime import date
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -26,7 +28,7 @@ from nlsolve.running.timing.exclusive import CountingTurns, ExclusiveTurns
 from nlsolve.running.turns import Turns
 from nlsolve.show.expectations import Finding, judged
 from nlsolve.show.figures import FigureError, draw, save
-from nlsolve.show.tables import Table, build, built
+from nlsolve.show.tables import PREAMBLE, PREAMBLE_FILE, Provenance, Table, build, built
 from nlsolve.study.study import Study
 from nlsolve.study.timing import Timing
 
@@ -212,11 +214,16 @@ def _unfinished(finished: int, planned: int, judges: bool = False) -> tuple[str,
 
 def _show(store: Store, study: Study, frames: Frames) -> tuple[str, ...]:
     """Write tables, figures and the report. Returns a sentence for each that cannot be shown; the results stay."""
+    report = import_module("nlsolve.show.report")  # loads jinja2, which a run with nothing to show does without
     tables, notes = built(study.tables, frames.runs)
+    command = f"{study.command} --out {shlex.quote(str(store.folder))}" if study.command else ""
+    provenance = Provenance(study.name, command, report.machine_facts()["nlsolve"], date.today().isoformat())
+    if tables:
+        store.write_text(f"tables/{PREAMBLE_FILE}", PREAMBLE)
     shown: dict[str, pd.DataFrame] = {}
     beneath: dict[str, tuple[str, ...]] = {}
     for table in tables:
-        for ending, text in table.files().items():
+        for ending, text in table.files(provenance).items():
             store.write_text(f"tables/{table.spec.name}{ending}", text)
         shown |= table.frames()
         beneath[list(table.frames())[-1]] = table.notes
@@ -233,7 +240,6 @@ def _show(store: Store, study: Study, frames: Frames) -> tuple[str, ...]:
         environments = environments_of(store.parts, frames.runs)
         left_out = [(excluded.label, excluded.reason) for excluded in study.excluded]
         findings = Results(study, frames.runs, frames.steps, frames.fields).findings
-        report = import_module("nlsolve.show.report")  # loads jinja2, which a run with nothing to show does without
         report.write_report(
             store.folder, study.question, shown, captions, frames.runs, environments, findings, left_out, beneath
         )

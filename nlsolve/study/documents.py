@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import json
 import re
+import shlex
 import tomllib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -91,3 +93,11 @@ def _replaced(new: Mapping[str, Any], old: Mapping[str, Any], above: Place = ())
 
 def _is_inside(place: Place, places: set[Place]) -> bool:
     return any(place[:length] in places for length in range(1, len(place) + 1))
+
+
+def command_of(path: str | Path, overrides: Mapping[str, Any], quick: bool, plugins: Sequence[Path]) -> str:
+    """What runs the study of a file with these settings and plugins of one file."""
+    settings = [f"{name}={json.dumps(value, ensure_ascii=False, default=str)}" for name, value in overrides.items()]
+    given = (("--set", settings), ("--plugin", map(str, plugins)))
+    options = [word for option, values in given for value in values for word in (option, value)]
+    return shlex.join(["nlsolve", "run", str(path), *options, *["--quick"] * quick])

@@ -19,9 +19,9 @@ from nlsolve.results.parameters import VARIANT, names_settings
 from nlsolve.results.reference_error import REFERENCE
 from nlsolve.show.expectations import Expectation
 from nlsolve.show.figures import BaseFigure, FigureSpec
-from nlsolve.show.tables import TableSpec, check
+from nlsolve.show.tables import PREAMBLE_FILE, TableSpec, check
 from nlsolve.study.case import Case, Composer, Invalid
-from nlsolve.study.documents import EXTENDS, PLUGINS, read_document
+from nlsolve.study.documents import EXTENDS, PLUGINS, command_of, read_document
 from nlsolve.study.exclusions import Exclude, Excluded, Exclusions
 from nlsolve.study.sweeps import Document, Point, Setting, Sweep, assign_all, leaves, merged, places_of, swept_places
 from nlsolve.study.timing import Timing
@@ -64,6 +64,7 @@ class Study:
     has_quick : whether the study has a [quick] section, which `quick=True` and --quick apply.
     plugins : the files of plugins without installation whose components its cases may have.
     excluded : the cases that the study leaves out.
+    command : what runs it from the command line; empty for a study that is not in a file.
     expectations : what the study asserts of its results; of a quick study, what its [quick] section asserts.
     """
 
@@ -77,6 +78,7 @@ class Study:
     plugins: tuple[Path, ...] = ()
     excluded: tuple[Excluded, ...] = ()
     expectations: tuple[Expectation, ...] = ()
+    command: str = ""
 
     @classmethod
     def from_toml(
@@ -92,7 +94,9 @@ class Study:
         Raises StudyError with a sentence for each mistake: its line, its place, its value, and what is expected.
         """
         document, source = read_document(Path(path))
-        return _built(source, document, overrides or {}, quick, registry or load_registry(), Path(path).stem)
+        study = _built(source, document, overrides or {}, quick, registry or load_registry(), Path(path).stem)
+        plugins = () if registry is None else registry.files
+        return replace(study, command=command_of(path, overrides or {}, quick, plugins))
 
     @classmethod
     def from_dict(
@@ -345,13 +349,19 @@ def _settings_of(case: Case) -> str:
 
 
 def _called_alike(noun: str, specs: Sequence[TableSpec | BaseFigure]) -> list[Problem]:
-    """A problem for each table or figure whose files would replace those of an earlier one."""
+    """A problem for each table or figure whose files would replace those of an earlier one, or the preamble."""
     problems, names = [], set[str]()
     for number, spec in enumerate(specs):
-        if spec.name.casefold() in names:
+        stems = {spec.name.casefold()}
+        if isinstance(spec, TableSpec):
+            stems |= {f"{spec.name}-paper".casefold()} if spec.paper is not None else set()
+            if spec.name.casefold() == Path(PREAMBLE_FILE).stem:
+                sentence = f"the file {PREAMBLE_FILE} beside the tables has this name; choose another"
+                problems.append(Problem((noun, number, "name"), spec.name, sentence))
+        if stems & names:
             sentence = f"another {noun} has this name, perhaps in other letter case; its files would be replaced"
             problems.append(Problem((noun, number, "name"), spec.name, sentence))
-        names.add(spec.name.casefold())
+        names |= stems
     return problems
 
 

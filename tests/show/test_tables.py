@@ -134,8 +134,8 @@ def test_formats():
         r"\midrule",
         r"\bottomrule",
         r"\caption{Branches of 100 \% \& more}",
-        "1e-06",
-        "20 & 15",
+        r"{$10^{-6}$}",
+        "$20$ & 15",
     ):
         assert piece in latex
     console = Console(width=100, record=True, file=io.StringIO())

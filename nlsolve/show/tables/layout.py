@@ -3,20 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from difflib import get_close_matches
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
-from nlsolve.registry.problems import ABSENT, Problem, Source, StudyError
+from nlsolve.contracts.status import Status
+from nlsolve.registry.problems import ABSENT, Problem, Source, StudyError, did_you_mean
 from nlsolve.results.aggregates import key_of
 from nlsolve.results.columns import RUNS, is_measured, no_such_column
 from nlsolve.results.costs.lanes import on_seconds
 from nlsolve.results.frames import rows_of
 from nlsolve.results.selection import fits, same
 from nlsolve.results.verdicts import AT_A_SOLUTION, OUTCOME, SOLVED, SPEEDUP, Run, number, outcome, solved, status_of
-from nlsolve.show.tables.spec import TableSpec
-from nlsolve.show.tables.table import Table
+from nlsolve.show.tables.spec import TableSpec, written
+from nlsolve.show.tables.table import Table, shown_in
 
 MEASURED = (*RUNS, OUTCOME, SOLVED, SPEEDUP)
 """Columns that have values only when a case has been run."""
@@ -35,21 +37,22 @@ def build(spec: TableSpec, runs: pd.DataFrame) -> Table:
     problems = check(spec, known)
     if problems:
         raise StudyError(*(problem.sentence(Source(f"table {spec.name!r}")) for problem in problems))
-    notes = _on_seconds(spec, known)
+    notes = (*spec.notes, *_on_seconds(spec, known))
     chosen = spec.aggregated([run for run in known if fits(run, spec.where)])
-    rows = _numbered(key_of(spec.labels, run) for run in chosen)
+    rows = _numbered(key_of(spec.row_names, run) for run in chosen)
     columns = _numbered(key for run in chosen for key in _column_keys(spec, run))
     cells = np.full((len(rows), len(columns)), 0 if spec.count else np.nan, dtype=object)
     for run in chosen:
         for value, key in zip(spec.shown, _column_keys(spec, run), strict=True):
             failed = not spec.aggregates and status_of(run) not in AT_A_SOLUTION
-            cells[rows[key_of(spec.labels, run)], columns[key]] = run.get("status" if failed else value)
+            cells[rows[key_of(spec.row_names, run)], columns[key]] = run.get("status" if failed else value)
     names = (*spec.columns, "") if spec.columns and len(spec.shown) > 1 else spec.columns or ("",)
-    index, header = _index(list(rows), spec.labels), _index(list(columns), names)
+    index, header = _index(list(rows), spec.row_names), _index(list(columns), names)
     frame = pd.DataFrame(cells, index=index, columns=header, dtype=object)
     if spec.paper is None:
         return Table(spec, frame, notes=notes)
-    compared = spec.paper.compare(cells, spec.text)
+    shown = shown_in(spec, header)
+    compared = spec.paper.compare(cells, lambda value, column: spec.text(value, shown[column]))
     return Table(spec, frame, pd.DataFrame(compared, index=index, columns=header, dtype=object), notes)
 
 
@@ -88,6 +91,7 @@ def check(spec: TableSpec, runs: Sequence[Run], measured: Iterable[str] = MEASUR
         for name in names
         if name not in known and not (planned and is_measured(name))  # what scenes measure is known afterwards
     ]
+    problems += _of_style(spec, runs)
     layout = (*spec.rows, *spec.columns)
     unmeasured = {name for name in measured if not all(name in run for run in runs)}
     if problems or unmeasured.intersection((*layout, *spec.where)):
@@ -118,6 +122,24 @@ def check(spec: TableSpec, runs: Sequence[Run], measured: Iterable[str] = MEASUR
             expected = f"should be {height} lists of {width} numbers, as the table has; there are lists of {lengths}"
             return [Problem(("paper", "values"), [list(row) for row in spec.paper.values], expected)]
     return []
+
+
+def _of_style(spec: TableSpec, runs: Sequence[Run]) -> list[Problem]:
+    """Columns of which the declaration says how they look and which the table does not have; labels of nothing."""
+    problems = [
+        Problem((field,), name, f"the table has no such column; {did_you_mean(name, spec.names)}")
+        for field, names in spec.styled.items()
+        for name in names
+        if name not in spec.names
+    ]
+    words = {written(run[name]) for name in (*spec.rows, *spec.columns) for run in runs if name in run}
+    known = {*spec.names, *words, *(status.word for status in Status)}
+    for name in spec.labels:
+        nearest = get_close_matches(name, known - set(spec.labels), n=1, cutoff=0.8)
+        if name not in known and nearest:
+            sentence = f"the table shows nothing of this name; did you mean {nearest[0]!r}?"
+            problems.append(Problem(("labels",), name, sentence))
+    return problems
 
 
 def _on_seconds(spec: TableSpec, runs: Sequence[Run]) -> tuple[str, ...]:

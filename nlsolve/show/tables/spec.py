@@ -1,155 +1,156 @@
-"""The declaration of a table: which runs, by which columns they are laid out, and which are shown."""
+"""The declaration of a table: its cells, how they are worded, and how they are set on paper."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Any, ClassVar
+from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import Field, field_validator, model_validator
+from pydantic import Field, model_validator
 
-from nlsolve.contracts.component import Component
-from nlsolve.results.aggregates import COUNT, NO_RUN, WITHIN, Cheapest, counted, success
-from nlsolve.results.columns import is_timed
-from nlsolve.results.costs.crossover import Crossover
-from nlsolve.results.costs.lanes import ONE, Lanes
-from nlsolve.results.published_values import PublishedValues
-from nlsolve.results.selection import Names, Scalar, Where
-from nlsolve.results.verdicts import ACCEPTED, SOLVED, SPEEDUP, Run
+from nlsolve.results.aggregates import NO_RUN
+from nlsolve.results.columns import RUNS
+from nlsolve.results.selection import Names
+from nlsolve.show.tables.cells import Cells
+from nlsolve.show.tables.numbers import plain, significant
 
-SHARE = ".2f"
-"""Format of shares where a table gives none."""
+Align = Literal["left", "center", "right", "number"]
+"""How the cells of a column stand: at one of its sides, or by their decimal points."""
+
+CONVERSIONS: dict[str, dict[str, float]] = {
+    "s": {"ms": 1e3, "µs": 1e6, "ns": 1e9, "min": 1 / 60, "h": 1 / 3600},
+    "mm": {"m": 1e-3, "cm": 0.1, "µm": 1e3},
+    "": {"%": 1e2, "‰": 1e3},
+}
+"""Unit of a column -> the units it can be shown in, each with the factor."""
+
+PER_COLUMN = "of all columns, or column -> number"
 
 
-class TableSpec(Component):
+class TableSpec(Cells):
     """A table as a study declares it."""
 
-    noun: ClassVar[str] = "table"
-
-    name: str = Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_-]*$", max_length=100, description="stem of the files written")
-    rows: Names = Field(
-        (), description="column or columns of `runs` that tell the rows apart; may be absent with cheapest"
-    )
-    columns: Names = Field((), description="column or columns of `runs` that tell the columns apart")
-    value: Names = Field(
-        (),
-        description="column or columns of `runs` shown in the cells, or `outcome`; `speedup`: seconds of the run named "
-        "by `against` over those of the run; `solved`: the share of a cell's runs that are solved, with its interval; "
-        "with count: runs, solved",
-    )
-    where: Where = Field(
-        default_factory=dict, description="column of `runs` -> value, or list of values, a run must have"
-    )
-    against: dict[str, Scalar] = Field(
+    labels: dict[str, str] = Field(
         default_factory=dict,
-        description="column of `runs` -> value of the run that `speedup` compares with; elsewhere it is like the run "
-        "in rows and columns",
+        description='column, or value in rows, columns or cells -> what is printed of it, as plain text: { anm = "ours '
+        '(𝑝 = 20)" }; absent: in LaTeX the symbol of the column',
     )
-    caption: str = Field("", description="sentence above the table")
-    format: str | None = Field(None, description='Python format of a number, such as ".2e"; absent: four digits')
-    accepted: float = Field(ACCEPTED, gt=0, description="relative error up to which `outcome` is right")
-    error: str = Field("velocity_error", description="column of `runs` by which `outcome` is right or wrong")
-    interval: float = Field(0.9, gt=0, lt=1, description="confidence of the interval of a share solved")
-    cheapest: Cheapest | None = Field(
-        None, description="keep the cheapest run within each error only, of each of the rows and columns"
+    units: dict[str, str] = Field(
+        default_factory=dict,
+        description='column -> unit that it is shown in, { seconds = "ms" }; numbers in s, in mm and without a unit '
+        "are converted (to ms, µs, ns, min, h; m, cm, µm; %, ‰), of a parameter or a plugin's column it is a label",
     )
-    crossover: Crossover | None = Field(
-        None, description="which strategy is cheapest by the ratio of factorisation to triangular solve"
+    align: dict[str, Align] = Field(
+        default_factory=dict, description="column -> where its cells stand; absent: numbers by their points, words left"
     )
-    count: bool = Field(
-        False, description="cells count runs, such as rows = variant, columns = outcome; value = solved: those solved"
+    digits: Annotated[int, Field(ge=0, le=17)] | dict[str, Annotated[int, Field(ge=0, le=17)]] = Field(
+        default_factory=dict, description=f"digits after the point, {PER_COLUMN}"
     )
-    lanes: Lanes = ONE
-    paper: PublishedValues | None = Field(None, description="a paper's values to compare with")
-
-    @field_validator("format")
-    @classmethod
-    def _formats_numbers(cls, value: str | None) -> str | None:
-        if value is not None:
-            try:
-                format(1.0, value)
-            except ValueError:
-                raise ValueError('should be a Python format of a number, such as ".3g" or ".2e"') from None
-        return value
+    figures: Annotated[int, Field(ge=1, le=17)] | dict[str, Annotated[int, Field(ge=1, le=17)]] = Field(
+        default_factory=dict,
+        description=f"significant figures, {PER_COLUMN}; absent: four, in LaTeX those that the column is worth",
+    )
+    notes: Names = Field((), description="sentences beneath the table")
+    label: str = Field(
+        "", pattern=r"^[A-Za-z0-9:._/+-]*$", description=r"what \ref calls the table in LaTeX; absent: tab:NAME"
+    )
+    width: Literal["single", "half", "double", "landscape"] = Field(
+        "single",
+        description="what the table fits into in LaTeX: the column of a page with one (single) or two (half), both "
+        "columns (double), or a page turned (landscape)",
+    )
+    fit: Literal["auto", "small", "wrap", "split"] = Field(
+        "auto",
+        description="how a table that is too wide is made to fit in LaTeX: in smaller letters (small), words on "
+        "several lines (wrap), columns in several parts (split), or the first of these that is enough (auto)",
+    )
 
     @model_validator(mode="after")
-    def _says_what_it_shows(self) -> TableSpec:
-        if self.count and (self.cheapest is not None or not set(self.value) <= {COUNT, SOLVED}):
-            drop = "cheapest" if self.cheapest is not None else "value, or show runs or solved"
-            raise ValueError(f"count = true shows numbers of runs; drop {drop}")
-        if self.crossover is not None:
-            given = [name for name in ("rows", "columns", "value", "cheapest", "count", "paper") if getattr(self, name)]
-            if given:
-                raise ValueError(f"a crossover lays itself out; drop {given[0]}")
-            return self
-        if not (self.count or self.value):
-            raise ValueError("value is required, and missing: columns to show, or count = true")
-        if not self.rows and self.cheapest is None:
-            raise ValueError("rows is required, and missing: a column that tells the rows apart")
-        if not self.count and SOLVED in self.value and (len(self.value) > 1 or self.cheapest is not None):
-            drop = "cheapest" if self.cheapest is not None else "the other values"
-            raise ValueError(f'value = "solved" shows shares of all the runs of a cell; drop {drop}')
-        if SPEEDUP in self.value and not self.against:
-            raise ValueError('a speedup compares with a run: say with which, as in against = { variant = "newton" }')
-        if self.paper is not None and (self.success or self.cheapest is not None):
-            raise ValueError("paper values are compared number by number, so not with cheapest or shares solved")
+    def _prints_a_number_in_one_way(self) -> TableSpec:
+        both = sorted(set(_named(self.digits)) & set(_named(self.figures)))
+        if both or (isinstance(self.digits, int) and isinstance(self.figures, int)):
+            of = f" of {both[0]}" if both else ""
+            raise ValueError(f"digits and figures{of} exclude each other; drop one of them")
         return self
 
     @model_validator(mode="after")
-    def _one_value_beside_a_paper(self) -> TableSpec:
-        if self.paper is not None and self.columns and len(self.value) > 1:
-            raise ValueError("a table with paper values and columns should show one value only")
+    def _shows_units_it_can_convert_to(self) -> TableSpec:
+        for name, unit in self.units.items():
+            own = RUNS[name].unit if name in RUNS else None
+            known = CONVERSIONS.get(own or "", {})
+            if own is not None and unit != own and unit not in known:
+                there = ", ".join(filter(None, (own, *known)))
+                raise ValueError(f"units of {name} cannot be {unit!r}; it can be shown in {there}")
         return self
 
     @property
-    def success(self) -> bool:
-        """Whether cells are shares of runs solved."""
-        return self.value == (SOLVED,) and not self.count
+    def styled(self) -> dict[str, tuple[str, ...]]:
+        """Field -> the columns that it says something of."""
+        numbers = {field: tuple(_named(getattr(self, field))) for field in ("digits", "figures")}
+        return {"units": tuple(self.units), "align": tuple(self.align), **numbers}
 
     @property
-    def shown(self) -> Names:
-        """Columns whose values are in the cells."""
-        if self.crossover is not None:
-            return self.crossover.shown
-        return self.value or (COUNT,)
+    def names(self) -> tuple[str, ...]:
+        """The columns of `runs`, or of what is made of them, that the table has."""
+        return (*self.row_names, *self.columns, *self.shown)
 
-    @property
-    def labels(self) -> Names:
-        """Columns whose values tell the rows apart."""
-        if self.crossover is not None:
-            return self.crossover.labels
-        return self.rows if self.cheapest is None else (WITHIN, *self.rows)
+    def factor(self, column: str) -> float:
+        """What numbers of a column are multiplied by."""
+        unit = self.units.get(column, "")
+        own = RUNS[column].unit if column in RUNS else ""
+        return CONVERSIONS.get(own, {}).get(unit, 1.0)
 
-    @property
-    def aggregates(self) -> bool:
-        """Whether a cell says something of many runs, and not of one."""
-        return self.count or self.success or self.cheapest is not None or self.crossover is not None
+    def has_form(self, column: str) -> bool:
+        """Whether the declaration says how numbers of a column are written."""
+        return self.format is not None or any(
+            isinstance(given, int) or column in given for given in (self.digits, self.figures)
+        )
 
-    @property
-    def shows_seconds(self) -> bool:
-        """Whether cells hold what was read from a clock, or are chosen by it."""
-        names = (*self.value, *(() if self.cheapest is None else (self.cheapest.cost,)))
-        return self.crossover is not None or SPEEDUP in names or any(map(is_timed, names))
+    def number(self, value: float, column: str) -> str:
+        """A number of a column, already in the unit it is shown in."""
+        for of_column in (True, False):
+            for given, form in ((self.digits, _fixed), (self.figures, significant)):
+                if isinstance(given, int) != of_column and (isinstance(given, int) or column in given):
+                    return form(value, given if isinstance(given, int) else given[column])
+        return plain(value) if self.format is None else format(value, self.format)
 
-    def aggregated(self, runs: Sequence[Run]) -> Sequence[Run]:
-        """What the cells are filled from: the chosen runs themselves, or a row for many of them."""
-        layout = (*self.rows, *self.columns)
-        if self.cheapest is not None:
-            return self.cheapest.of(runs, layout)
-        if self.success:
-            return success(runs, layout, self.interval, self.format or SHARE)
-        if self.crossover is not None:
-            return self.crossover.of(runs)
-        return counted(runs, layout) if self.count else runs
-
-    def text(self, value: Any) -> str:
-        """What is printed in a cell that holds this value."""
-        if isinstance(value, str):
-            return value
+    def text(self, value: Any, column: str) -> str:
+        """What is printed in a cell of a column that holds this value."""
         if isinstance(value, (bool, np.bool_)):
-            return "yes" if value else "no"
+            value = "yes" if value else "no"
+        if isinstance(value, str):
+            return self.labels.get(value, value)
         if value is None or np.isnan(value):
             return NO_RUN
-        if self.format is not None:
-            return format(float(value), self.format)
-        return str(int(value)) if float(value).is_integer() and abs(value) < 1e9 else f"{value:.4g}"
+        return self.number(float(value) * self.factor(column), column)
+
+    def word(self, value: Any, column: str) -> str:
+        """What is printed of a value that tells rows or columns apart; its column is empty where it names another."""
+        if not column:
+            return self.heading(str(value))
+        given = written(value)
+        if given in self.labels or not isinstance(value, (int, float, np.number)) or isinstance(value, bool):
+            return self.labels.get(given, given)
+        changed = column in self.units or any(column in _named(each) for each in (self.digits, self.figures))
+        return self.text(value, column) if changed else given
+
+    def heading(self, column: str) -> str:
+        """What is printed above a column: its label, or its name; and the unit, where the declaration has one."""
+        return f"{self.labels.get(column, column)}{self.bracket(column)}"
+
+    def bracket(self, column: str) -> str:
+        """The unit that the declaration has of a column, in brackets."""
+        return f" [{self.units[column]}]" if self.units.get(column) else ""
+
+
+def written(value: Any) -> str:
+    """A value that tells rows or columns apart, as it is written in `labels`."""
+    return f"{value:g}" if isinstance(value, float) else str(value)
+
+
+def _fixed(value: float, digits: int) -> str:
+    return f"{value:.{digits}f}"
+
+
+def _named(given: int | dict[str, Any]) -> dict[str, Any]:
+    """Column -> what is given of it alone."""
+    return {} if isinstance(given, int) else given
