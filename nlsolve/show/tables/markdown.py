@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import re
 
-SPECIAL = re.compile(r"[\\|`*\[\]<>$~]|(?<!\w)_|_(?!\w)|&(?=#?\w+;)")
-"""Letters that begin or end something in Markdown as GitHub reads it. A line within a word is none."""
+SPECIAL = re.compile(r"[\\|`*<>$~]|(?<!\w)_|_(?!\w)|&(?=#?\w+;)|\[(?=\^)|\](?=[(\[:])")
+"""Letters that begin or end something in Markdown as GitHub reads it. A line within a word is none, and a bracket only
+that of a link."""
 
 
 def escaped(text: str) -> str:

@@ -28,11 +28,12 @@ class Size:
     between: float
 
 
-NORMAL, SMALL, SMALLEST = (
-    Size("", 1.0, 12.0, 6.0),
-    Size(r"\small", 0.9, 11.0, 5.0),
-    Size(r"\footnotesize", 0.8, 9.5, 4.0),
-)
+NORMAL = Size("", 1.0, 12.0, 6.0)
+SMALL = Size(r"\small", 0.92, 11.0, 4.5)
+SMALLEST = Size(r"\footnotesize", 0.85, 9.5, 3.0)
+
+SCALED = 1.05
+"""How much wider than the line the last attempt at one part may be, which is then scaled down."""
 
 
 @dataclass(frozen=True)
@@ -70,12 +71,7 @@ ATTEMPTS: dict[str, tuple[Setting, ...]] = {
     "auto": (
         *ONCE,
         *SMALLER,
-        *(
-            Setting(size, heads, limit)
-            for limit in (160.0, 110.0)
-            for size in (SMALL, SMALLEST)
-            for heads in (0.0, 60.0)
-        ),
+        *(Setting(size, 0.0, limit) for limit in (160.0, 110.0) for size in (SMALL, SMALLEST)),
     ),
 }
 """What is tried to make a table fit, by the field `fit` of tables; the last of them is kept."""
@@ -134,19 +130,21 @@ class Plan:
 
 
 def plan_of(grid: Grid, width: float, fit: str) -> Plan:
-    """The first attempt by which the grid fits into the width [pt], else the last one, in as few parts as may be."""
-    everything = range(len(grid.columns))
-    for setting in ATTEMPTS[fit]:
-        if setting.total((*grid.labels, *grid.columns)) <= width:
-            return Plan(setting, (everything,))
-    setting = ATTEMPTS[fit][-1]
-    if fit not in SPLIT:
-        return Plan(setting, (everything,))
-    for number in range(2, len(everything)):
-        parts = _even(len(everything), number)
-        if all(setting.total((*grid.labels, *(grid.columns[k] for k in part))) <= width for part in parts):
-            return Plan(setting, parts)
-    return Plan(setting, tuple(range(k, k + 1) for k in everything) or (everything,))
+    """The first attempt by which the grid fits into the width [pt], in as few parts as may be; else the last one."""
+    attempts, number = ATTEMPTS[fit], len(grid.columns)
+    most = range(1, max(number, 1) + 1) if fit in SPLIT else range(1, 2)
+    for parts in (_even(number, count) for count in most):
+        scaled = SCALED if len(parts) == 1 else 1.0
+        if not _fits(grid, attempts[-1], parts, width * scaled):
+            continue
+        first = next((setting for setting in attempts if _fits(grid, setting, parts, width)), attempts[-1])
+        return Plan(first, parts)
+    return Plan(attempts[-1], _even(number, most[-1]))
+
+
+def _fits(grid: Grid, setting: Setting, parts: Sequence[range], width: float) -> bool:
+    """Whether each part is no wider than the width [pt], the labels of the rows beside it."""
+    return all(setting.total((*grid.labels, *(grid.columns[k] for k in part))) <= width for part in parts)
 
 
 @lru_cache(maxsize=4096)

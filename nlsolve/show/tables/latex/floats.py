@@ -6,6 +6,7 @@ Columns of numbers are those of siunitx, lines those of booktabs; ``\resizebox``
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -13,7 +14,7 @@ from itertools import groupby
 
 from nlsolve.show.tables.latex.fit import AVAILABLE, NumberFormat, Plan, Setting, plan_of, words_of
 from nlsolve.show.tables.latex.grid import Grid, GridColumn
-from nlsolve.show.tables.latex.words import NUMBER, Words, of_paragraph, stacked
+from nlsolve.show.tables.latex.words import NUMBER, Words, of_paragraph, stacked, width_of
 from nlsolve.show.tables.spec import TableSpec
 
 PACKAGES = ("booktabs", "graphicx", "siunitx")
@@ -30,8 +31,6 @@ PREAMBLE = "\n".join(
 """What the tables need, in a file beside them."""
 
 LETTER = {"left": "l", "center": "c", "right": "r", "number": "l"}
-CAPTION_LINE = 65
-"""Letters of a caption on a line."""
 
 
 def packages_of(spec: TableSpec) -> tuple[str, ...]:
@@ -44,7 +43,7 @@ def latex(spec: TableSpec, grid: Grid) -> str:
     width, height = AVAILABLE[spec.width]
     plan = plan_of(grid, width, spec.fit)
     tabulars = [_Tabular(grid, plan.setting, part) for part in plan.parts]
-    around = sum(len(text) // CAPTION_LINE + 1 for text in (grid.caption, *grid.notes)) * 12.0 + 30.0
+    around = sum(width_of(text) // width + 1 for text in (f"Table 99: {grid.caption}", *grid.notes)) * 12.0 + 36.0
     floats = list(_floats(tabulars, height - around))
     texts = [_float(spec, grid, plan, content, n == 0, n == len(floats) - 1) for n, content in enumerate(floats)]
     if spec.width == "landscape":
@@ -75,9 +74,10 @@ class _Tabular:
         return [max(len(words_of(column.cells[row]).lines(limit)) for column in self.columns) or 1 for row in self.rows]
 
     def height(self, rows: range) -> float:
-        """Height of these rows with headings of up to three lines, and rules [pt]."""
-        heads = 3 * (len(self.columns[-1].heads) + bool(self.grid.above.tex))
-        return self.setting.size.line * (heads + sum(self.lines[row] for row in rows)) + 20.0
+        """Height of these rows with headings and rules [pt]; headings above several columns may have two lines."""
+        above = 2 * (len(self.columns[-1].heads) - 1 + bool(self.grid.above.tex))
+        last = max(len(each.heads[-1].lines(self.setting.heading_limit(each))) for each in self.columns)
+        return self.setting.size.line * (above + last + sum(self.lines[row] for row in rows) + 2)
 
     def cell(self, column: GridColumn, row: int) -> str:
         """A cell of a row; numbers that stand by their points are left to siunitx."""
@@ -135,14 +135,15 @@ class _Tabular:
     def _body(self, rows: range) -> Iterator[str]:
         """The rows. What the one above has said of several columns of labels is not said again."""
         labels = self.grid.labels
-        groups = len(labels) > 1 and len(set(labels[0].cells)) < len(labels[0].cells)
+        many = Counter(labels[0].cells) if len(labels) > 1 else Counter[str]()
         for row in rows:
             cells = [self.cell(column, row) for column in self.columns]
             for level in range(len(labels) - 1) if row > rows[0] else ():
                 if any(each.cells[row] != each.cells[row - 1] for each in labels[: level + 1]):
                     break
                 cells[level] = ""
-            if groups and row > rows[0] and cells[0]:
+            begins = row > rows[0] and bool(cells[0])
+            if begins and max(many[labels[0].cells[k]] for k in (row - 1, row)) > 1:
                 yield r"\addlinespace"
             yield " & ".join(cells) + r" \\"
 
@@ -177,7 +178,7 @@ def _float(
 ) -> str:
     """One float: the caption, its parts of the table, and under the last of them the notes."""
     star = "*" if spec.width == "double" else ""
-    parts = [rf"\begin{{table{star}}}[htbp]", r"\centering", r"\sloppy"]
+    parts = [rf"\begin{{table{star}}}[htbp]", r"\centering", r"\sloppy", r"\setlength{\belowcaptionskip}{6pt}"]
     caption = of_paragraph(grid.caption)
     if caption and not first:
         parts += [r"\addtocounter{table}{-1}", rf"\caption[]{{{caption} (continued)}}"]

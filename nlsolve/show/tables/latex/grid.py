@@ -87,8 +87,9 @@ def grid_of(spec: TableSpec, cells: pd.DataFrame, shown: Sequence[str], notes: S
         [heading(spec, name, name in in_percent)] if not spec.columns else _heads(spec, cells.columns, key, in_percent)
         for key, name in zip(cells.columns, shown, strict=True)
     ]
+    usual: Align = "number" if spec.paper is None else "left"
     columns = tuple(
-        GridColumn(tuple(head), tuple(_without_percent(text, name in in_percent)), spec.align.get(name, "number"))
+        GridColumn(tuple(head), tuple(_without_percent(text, name in in_percent)), spec.align.get(name, usual))
         for head, text, name in zip(heads, texts, shown, strict=True)
     )
     labels = tuple(

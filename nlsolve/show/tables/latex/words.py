@@ -23,7 +23,7 @@ from nlsolve.show.tables.latex.letters import (
 )
 
 NARROW, WIDE, WIDEST = set("ijl!'.,:;| []()fIrt/-₀₁₂₃₄₅₆₇₈₉⁰¹²³⁴⁵⁶⁷⁸⁹"), set("mw%&+=~≤≥≈×−→‖"), set("MW—")
-WIDTHS = (3.6, 5.3, 7.7, 10.3)
+WIDTHS = (3.4, 5.05, 7.4, 10.2)
 """Widths of narrow, usual (capital: the next), wide and widest letters of 10 pt [pt], rather too large."""
 
 UNBROKEN = 24
@@ -186,7 +186,7 @@ def _joined(text: str) -> Iterator[str]:
             continue
         before = ""
         for letter in letters:
-            yield "{}" if letter == before and letter in "-',–—‐‑" else ""  # else LaTeX joins the two
+            yield r"{\kern0pt}" if letter == before and letter in "-',–—‐‑" else ""  # else TeX joins the two
             yield _cluster(letter)
             before = letter
 
