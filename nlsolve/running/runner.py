@@ -225,8 +225,12 @@ def _show(store: Store, study: Study, frames: Frames) -> tuple[str, ...]:
     for table in tables:
         for ending, text in table.files(provenance).items():
             store.write_text(f"tables/{table.spec.name}{ending}", text)
-        shown |= table.frames()
-        beneath[list(table.frames())[-1]] = table.notes
+        frames_shown = {
+            title if title not in shown else f"{title} ({table.spec.name})": frame
+            for title, frame in table.frames().items()
+        }
+        shown |= frames_shown
+        beneath[list(frames_shown)[-1]] = table.notes
     captions: list[tuple[str, str]] = []
     with store.writing():
         for spec in study.figures:

@@ -158,6 +158,26 @@ def test_table(tmp_path):
     assert (wrong.exit_code, wrong.stderr.strip()) == (2, "o: there is no table 'brances'; did you mean 'branches'?")
 
 
+def test_table_tells_whether_a_paper_is_stale(tmp_path):
+    path = write_study(tmp_path)
+    nlsolve("run", path, "--set", "law.index=0.25", "--out", "o")
+    table = tmp_path / "o" / "tables" / "branches.tex"
+    written = table.read_text(encoding="utf-8")
+    assert written.startswith("% Table branches of the study study, written by nlsolve run ")
+    assert "study.toml --set law.index=0.25 --out o\n" in written
+    assert (tmp_path / "o" / "tables" / "preamble.tex").exists()
+    (tmp_path / "paper.tex").write_text("\\input{o/tables/branches}", encoding="utf-8")
+    fresh = nlsolve("table", "o", "--check", "paper.tex")
+    assert (fresh.exit_code, fresh.stdout.endswith(": table branches: as the results say\n")) == (0, True)
+    table.write_text(written.replace('"content": "', '"content": "0'), encoding="utf-8")
+    stale = nlsolve("table", "o", "--check", "paper.tex")
+    assert stale.exit_code == 3
+    assert "table branches: stale, the results tell something else now; a fresh one is" in stale.stdout
+    assert json.loads(nlsolve("table", "o", "--check", "paper.tex", "--json").stdout)[0]["table"] == "branches"
+    missing = nlsolve("table", "o", "--check", "nowhere.tex")
+    assert (missing.exit_code, missing.stderr) == (2, "nowhere.tex: cannot be read: No such file or directory\n")
+
+
 def test_validate(tmp_path):
     path = write_study(tmp_path)
     assert nlsolve("validate", path).stdout == f"{path} is valid: 4 cases (1 with --quick). How many branches?\n"

@@ -124,7 +124,7 @@ def test_a_note_stands_beneath_the_table_in_every_form():
     found = build(table(lanes="mixed"), MIX)
     (note,) = found.notes
     assert found.markdown().endswith(f"|\n\n{note}\n")
-    assert found.latex().endswith(f"\n% {note}\n")
+    assert f"\n{note}\n\\end{{minipage}}\n\\end{{table}}\n" in found.latex()
     assert found.rich()[-1].caption == note
     assert note not in found.csv()
 

@@ -12,9 +12,11 @@ import pandas as pd
 import pytest
 
 from nlsolve.contracts.status import Status
+from nlsolve.results.columns import RUNS as RESULTS
 from nlsolve.show.expectations import Finding
 from nlsolve.show.figures import LineFigure, draw, save
 from nlsolve.show.report import machine_facts, write_report
+from nlsolve.show.tables import TableSpec, build
 
 RUNS = pd.DataFrame(
     {
@@ -119,3 +121,20 @@ def test_findings_and_cases_that_were_left_out_are_on_the_page(tmp_path: Path) -
     assert "<li>No order &gt; 40 is worth it. 23 cases: p = 41; p = 42" in text
     assert "p = 60; …</li>" in text
     assert "Findings" not in write_report(tmp_path, "?", {}, [], RUNS).read_text(encoding="utf-8")
+
+
+def test_a_declared_table_is_escaped_wherever_it_is_named(tmp_path: Path) -> None:
+    """In the caption, the names and the values of rows and columns, the cells, the labels and the notes."""
+    bad = "<script>x</script>"
+    frame = pd.DataFrame({"status": "converged", "row": [f"r{bad}"], "column": [f"c{bad}"], "lane": [f"v{bad}"]})
+    frame = frame.reindex(columns=[*RESULTS, *(name for name in frame if name not in RESULTS)])
+    given = {"name": "t", "caption": bad, "labels": {"lane": bad, "row": f"n{bad}"}, "notes": bad}
+    for value in ("lane", ["lane", "status"]):
+        spec = TableSpec.model_validate({**given, "rows": "row", "columns": "column", "value": value})
+        table = build(spec, frame)
+        frames = table.frames()
+        page = write_report(tmp_path, "q", frames, [], RUNS, notes=dict.fromkeys(frames, table.notes)).read_text(
+            "utf-8"
+        )
+        assert bad not in page
+        assert page.count("&lt;script&gt;x&lt;/script&gt;") >= 5

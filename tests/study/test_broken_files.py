@@ -254,6 +254,18 @@ FILES: dict[str, tuple[str | bytes, str]] = {
         BASE + TABLE + TABLE.replace('"t"', '"T"'),
         ", line 12: table[1].name = 'T': another table has this name, perhaps in other letter case; its",
     ),
+    "a table whose file another's comparison would replace": (
+        BASE + TABLE + 'paper = { source = "s", values = [[1]] }\n' + TABLE.replace('"t"', '"t-paper"'),
+        ", line 13: table[1].name = 't-paper': another table has this name, perhaps in other letter case; its",
+    ),
+    "a table whose file is the preamble's": (
+        BASE + TABLE.replace('"t"', '"Preamble"'),
+        ", line 8: table[0].name = 'Preamble': the file preamble.tex beside the tables has this name; choose another",
+    ),
+    "a table with a word on a column that it does not have": (
+        BASE + TABLE + "digits = { secnds = 2 }\n",
+        ", line 11: table[0].digits = 'secnds': the table has no such column; there are 'solver.kind', 'tangents'",
+    ),
     "a figure of an unknown kind": (
         BASE + '[[figure]]\nname = "f"\nkind = "pie"\n',
         ", line 9: figure[0].kind = 'pie': should be 'line', 'map', 'trade', 'crossover',",

@@ -50,10 +50,34 @@ def tables_of(path: Path) -> dict[str, Table]:
     return {f"{path.stem}-{table.spec.name}": table for table in tables}
 
 
+@pytest.fixture(scope="module")
+def texts() -> dict[str, str]:
+    """The declared tables of all shipped studies in LaTeX."""
+    return {name: table.latex() for path in STUDIES for name, table in tables_of(path).items()}
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("engine", ENGINES)
-def test_every_table_fits_one_column(tmp_path, engine):
+def test_every_table_fits_one_column(tmp_path, engine, texts):
     needs(engine)
-    texts = {name: table.latex() for path in STUDIES for name, table in tables_of(path).items()}
     assert len(texts) > 60
     assert typeset(tmp_path, texts, engine).stat().st_size > 50_000
+
+
+def test_the_first_study_is_typeset(tmp_path):
+    """The tables of the README, whose headings have a Greek letter and which are wide."""
+    needs("pdflatex")
+    (path,) = (path for path in STUDIES if path.stem == "first")
+    study = Study.from_toml(path)
+    known = {
+        "tangents": 60,
+        "triangular_solves": 620,
+        "seconds": 7.002,
+        "residual_norm": 9.71e-9,
+        "velocity_error": 0.01674,
+    }
+    tables, _ = built(study.tables, made_up(study).assign(status="converged", **known))
+    texts = {f"first-{table.spec.name}": table.latex() for table in tables}
+    assert r"tolerance $\eta$" in texts["first-branches"]
+    assert texts["first-strategies"].count(r"\toprule") == 1
+    assert typeset(tmp_path, texts, "pdflatex").exists()
