@@ -10,6 +10,7 @@ from collections.abc import Mapping
 import pytest
 
 from nlsolve.results.columns import DIAGNOSTICS, FIELDS, FRAMES, RENAMED, RUNS, STEPS, Column, no_such_column
+from nlsolve.results.parameters import LETTERS
 from nlsolve.results.verdicts import is_error
 from nlsolve.show.figures.style import axis_label, symbol
 
@@ -79,3 +80,14 @@ def test_results_load_no_matplotlib() -> None:
     )
     told = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
     assert told.split() == ["True", "False"]
+
+
+@pytest.mark.parametrize("column", [*RUNS.values(), *LETTERS.values()], ids=lambda column: column.name)
+def test_what_a_paper_prints_of_a_column(column: Column) -> None:
+    assert column.symbol.count("$") % 2 == 0
+    assert 2 <= column.figures <= 3
+
+
+def test_letters_are_of_parameters() -> None:
+    assert all("." in name and name not in RUNS for name in LETTERS)
+    assert LETTERS["solver.tolerance"].symbol == r"tolerance $\eta$"

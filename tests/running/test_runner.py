@@ -112,6 +112,21 @@ def test_files(tmp_path):
     assert f"{environment}: 4 rows" in report
 
 
+def test_two_tables_under_one_caption_are_both_in_the_report(tmp_path):
+    twin = """[[table]]
+name = "twin"
+caption = "branches"
+rows = "solver.order"
+columns = "solver.tolerance"
+value = "factorizations"
+
+[quick]"""
+    run(Study.from_toml(write_study(tmp_path, ("[quick]", twin)), registry=registry_of()), tmp_path / "out")
+    report = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
+    assert "<h2>branches</h2>" in report
+    assert "<h2>branches (twin)</h2>" in report
+
+
 def test_a_second_run_computes_nothing_and_says_the_same(study, tmp_path, marched):
     first = run(study, tmp_path / "out")
     again = run(study, tmp_path / "out")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from pathlib import Path
 
 import pytest
@@ -9,8 +10,9 @@ from fakes import STUDY, Box, Homotopy, Honey, Newton, Plugin, registry_of
 
 from nlsolve.registry.problems import StudyError
 from nlsolve.registry.registry import Registry
-from nlsolve.study.documents import read_document
+from nlsolve.study.documents import command_of, read_document
 from nlsolve.study.study import Study
+from nlsolve.study.sweeps import parse_assignments
 
 REGISTRY = registry_of()
 HALF = """\
@@ -172,3 +174,15 @@ class TestQualifiedKinds:
         path = write(tmp_path, "study.toml", STUDY[: STUDY.index("[[sweep]]")].replace('kind = "anm"', solver))
         with pytest.raises(StudyError, match=r"line 14: solver.ordr = 3: no such field; there are 'kind'"):
             Study.from_toml(path, overrides={"start.solver.kind": "my-pkg:newton"}, registry=registry)
+
+
+def test_the_command_of_a_study_runs_it_again(tmp_path):
+    """What a table in LaTeX says of how it was made: every setting as --set reads it."""
+    path = tmp_path / "my study.toml"
+    path.write_text(STUDY, encoding="utf-8")
+    settings = {"solver.order": 5, "scene.kind": "box", "solver.tolerance": 1e-7}
+    words = shlex.split(Study.from_toml(path, settings, quick=True, registry=REGISTRY).command)
+    assert words[:3] == ["nlsolve", "run", str(path)]
+    assert words[-1] == "--quick"
+    assert parse_assignments(words[4:-1:2]) == settings
+    assert command_of("s.toml", {}, False, [Path("a.py")]) == "nlsolve run s.toml --plugin a.py"

@@ -130,6 +130,7 @@ def test_only_a_number_is_mathematics():
 
 def test_a_symbol_keeps_its_mathematics():
     assert of_symbol(r"$\|R\|_2$ of x_1").line == r"$\|R\|_2$ of x\_1"
+    assert of_symbol(r"a step $\Delta t$").tex == ("a", "step", r"$\Delta t$")
     assert of_symbol("relative residual") == of_text("relative residual")
 
 

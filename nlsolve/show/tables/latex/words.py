@@ -113,10 +113,10 @@ def of_comparison(text: str) -> Words:
 
 
 def of_symbol(symbol: str) -> Words:
-    r"""The words of a symbol of `nlsolve.results.columns`, in which $\|R\|_2$ is mathematics and has no spaces."""
+    r"""The words of a symbol of `nlsolve.results.columns`, in which $\|R\|_2$ is mathematics."""
     if "$" not in symbol:
         return of_text(symbol)
-    words = symbol.split(" ")
+    words = re.findall(r"(?:\$[^$]*\$|[^\s$])+", symbol)
     widths = [4.0 + WIDTHS[1] * len(re.sub(r"\\[A-Za-z]+", "x", re.sub(r"[${}_^]", "", word))) for word in words]
     tex = [
         "".join(
