@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import re
+import time
 from pathlib import Path
 
 import numpy as np
@@ -274,6 +275,15 @@ def test_a_table_higher_than_the_page_goes_on():
     assert tex.count("Seconds (continued)") == tex.count(r"\addtocounter{table}{-1}") == 2
     assert tex.count(r"\label{tab:t}") == tex.count("A note.") == 1
     assert [tex.count(f"problem {row} &") for row in range(100)] == [1] * 100
+
+
+def test_many_rows_are_written_in_a_time_that_grows_with_them():
+    """Numbers, words and failures in 4000 rows: a look at all rows for each of them would take minutes."""
+    frame = wide(1, rows=4000).assign(message="a word", tangents=1.5)
+    table = build(spec(**BY_STRATEGY | {"rows": "problem", "columns": [], "value": ["seconds", "message"]}), frame)
+    began = time.process_time()
+    assert table.latex().count(r"\toprule") > 50
+    assert time.process_time() - began < 20.0
 
 
 def test_widths():

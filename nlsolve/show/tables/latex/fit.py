@@ -51,7 +51,8 @@ class Setting:
 
     def width(self, column: GridColumn) -> float:
         """Width of a column in letters of 10 pt, with its last heading."""
-        return max(self.body(column), column.heads[-1].within(self.heading_limit(column)))
+        body, head = self.body(column), column.heads[-1]
+        return max(body, head.within(max(body, head.longest, self.heads)))
 
     def heading_limit(self, column: GridColumn) -> float:
         """Width at which the last heading of a column is wrapped."""
@@ -147,7 +148,7 @@ def _fits(grid: Grid, setting: Setting, parts: Sequence[range], width: float) ->
     return all(setting.total((*grid.labels, *(grid.columns[k] for k in part))) <= width for part in parts)
 
 
-@lru_cache(maxsize=4096)
+@lru_cache(maxsize=2**16)
 def words_of(cell: str) -> Words:
     """A cell as words: a number, a comparison with a paper, or text."""
     return of_value(cell) if "(" not in cell else of_comparison(cell)

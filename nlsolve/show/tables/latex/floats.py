@@ -73,10 +73,15 @@ class _Tabular:
         limit = self.setting.limit
         return [max(len(words_of(column.cells[row]).lines(limit)) for column in self.columns) or 1 for row in self.rows]
 
+    @cached_property
+    def heads(self) -> list[list[str]]:
+        """The lines of the last heading of each column."""
+        return [column.heads[-1].lines(self.setting.heading_limit(column)) for column in self.columns]
+
     def height(self, rows: range) -> float:
         """Height of these rows with headings and rules [pt]; headings above several columns may have two lines."""
         above = 2 * (len(self.columns[-1].heads) - 1 + bool(self.grid.above.tex))
-        last = max(len(each.heads[-1].lines(self.setting.heading_limit(each))) for each in self.columns)
+        last = max(map(len, self.heads))
         return self.setting.size.line * (above + last + sum(self.lines[row] for row in rows) + 2)
 
     def cell(self, column: GridColumn, row: int) -> str:
@@ -91,18 +96,27 @@ class _Tabular:
 
     def tex(self, rows: range) -> str:
         """The tabular of some rows, no wider than its line."""
-        formats = [NumberFormat.of(each).tex if each.aligned else LETTER[each.align] for each in self.columns]
         parts = [
             r"\resizebox{\ifdim\width>\linewidth\linewidth\else\width\fi}{!}{%",
-            rf"\begin{{tabular}}{{@{{}}{' '.join(formats)}@{{}}}}",
+            rf"\begin{{tabular}}{{@{{}}{' '.join(self.formats)}@{{}}}}",
             r"\toprule",
-            *self._headings(),
+            *self.headings,
             r"\midrule",
             *self._body(rows),
             r"\bottomrule",
             r"\end{tabular}}",
         ]
         return "\n".join(parts)
+
+    @cached_property
+    def formats(self) -> list[str]:
+        """How LaTeX sets each column."""
+        return [NumberFormat.of(each).tex if each.aligned else LETTER[each.align] for each in self.columns]
+
+    @cached_property
+    def headings(self) -> list[str]:
+        """The rows of headings."""
+        return list(self._headings())
 
     def _headings(self) -> Iterator[str]:
         """The rows of headings, those above several columns with a line beneath."""
@@ -115,8 +129,7 @@ class _Tabular:
             spans = [(shown[each[0]].heads[level], len(each), sum(widths[k] for k in each)) for each in groups]
             yield from self._spanning(blank, spans)
         last = []
-        for column in self.columns:
-            lines = column.heads[-1].lines(self.setting.heading_limit(column))
+        for column, lines in zip(self.columns, self.heads, strict=True):
             text = stacked(lines, "b", "c" if column.aligned else LETTER[column.align])
             last.append(f"{{{text}}}" if column.aligned else text)
         yield " & ".join(last) + r" \\"

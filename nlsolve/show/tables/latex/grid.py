@@ -7,6 +7,7 @@ import json
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import pandas as pd
@@ -38,7 +39,7 @@ class GridColumn:
     cells: tuple[str, ...]
     align: Align
 
-    @property
+    @cached_property
     def aligned(self) -> bool:
         """Whether its numbers stand by their points."""
         return self.align == "number" and any(NUMBER.fullmatch(cell) for cell in self.cells)
