@@ -31,6 +31,7 @@ from nlsolve.cli.options import (
     default_folder,
     registry_of,
 )
+from nlsolve.cli.plugins.check import check
 from nlsolve.cli.printing import (
     count,
     left_out,
@@ -253,4 +254,5 @@ def statuses(words: list[str]) -> list[Status]:
     return [Status.of(word) for word in words]
 
 
+app.command()(check)
 app.add_typer(folders)

@@ -327,6 +327,7 @@ class Registry:
             raise PydanticCustomError("contract_wrong", message, told)
         try:
             cls.kind_name()
+            _check_properties(cls)
         except TypeError as error:
             raise PydanticCustomError("kind_undeclared", "{reason}", {"reason": str(error)}) from error
 

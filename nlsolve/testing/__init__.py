@@ -6,7 +6,7 @@
 A check takes an instance, runs it through what its contract promises, and raises AssertionError with a sentence that
 says which promise was broken and by how much. The numbers it draws are seeded: a check fails always or never.
 
-It may import series, contracts, solving, flow and algebra.
+It may import series, contracts, registry, solving, flow and algebra.
 """
 
 from __future__ import annotations
