@@ -32,6 +32,7 @@ from nlsolve.cli.options import (
     registry_of,
 )
 from nlsolve.cli.plugins.check import check
+from nlsolve.cli.plugins.new import new
 from nlsolve.cli.printing import (
     count,
     left_out,
@@ -255,4 +256,5 @@ def statuses(words: list[str]) -> list[Status]:
 
 
 app.command()(check)
+app.command()(new)
 app.add_typer(folders)

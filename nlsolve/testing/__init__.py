@@ -12,6 +12,7 @@ It may import series, contracts, registry, solving, flow and algebra.
 from __future__ import annotations
 
 from nlsolve.testing.discretizers import check_discretizer
+from nlsolve.testing.kit.toys import ToyLaw, toy_cloud
 from nlsolve.testing.laws import check_law
 from nlsolve.testing.linear_solvers import check_linear_solver
 from nlsolve.testing.problems import check_problem
@@ -27,6 +28,7 @@ from nlsolve.testing.scenes import check_scene, check_system
 from nlsolve.testing.solvers import check_solver
 
 __all__ = [
+    "ToyLaw",
     "check_discretizer",
     "check_globalization",
     "check_homotopy_form",
@@ -40,4 +42,5 @@ __all__ = [
     "check_scene",
     "check_solver",
     "check_system",
+    "toy_cloud",
 ]

@@ -10,7 +10,7 @@ from typer.testing import CliRunner
 
 from nlsolve.cli.app import app
 
-LAW = '''\
+LAW = """\
 from typing import Any, Literal
 
 from nlsolve.plugin import ConstitutiveLaw, Discretizer, LinearSolver
@@ -22,7 +22,7 @@ class Honey(ConstitutiveLaw):
 
     def viscosity(self, rate_squared: Any) -> Any:
         return self.mu + 0.0 * rate_squared
-'''
+"""
 
 
 def told(*words: str) -> tuple[int, str, str]:
