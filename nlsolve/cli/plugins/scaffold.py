@@ -10,8 +10,6 @@ from importlib.metadata import version
 from importlib.util import find_spec
 from pathlib import Path
 
-from jinja2 import Environment, FileSystemLoader, StrictUndefined
-
 from nlsolve.registry.problems import StudyError
 
 TEMPLATES = Path(__file__).parent / "templates"
@@ -100,5 +98,6 @@ def write(files: Mapping[str, str], folder: Path) -> list[Path]:
 
 
 def _rendered(template: str, words: Mapping[str, str]) -> str:
-    environment = Environment(loader=FileSystemLoader(TEMPLATES), undefined=StrictUndefined, autoescape=False)
-    return environment.get_template(f"{template}.jinja").render(words).rstrip() + "\n"
+    """The text of a template, in which {{ word }} stands for one of the words."""
+    text = (TEMPLATES / f"{template}.txt").read_text(encoding="utf-8")
+    return re.sub(r"\{\{ (\w+) \}\}", lambda found: words[found[1]], text).rstrip() + "\n"
