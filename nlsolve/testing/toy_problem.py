@@ -6,7 +6,7 @@ from collections import Counter
 from typing import Any, ClassVar
 
 import numpy as np
-import scipy.linalg
+import scipy
 import scipy.sparse as sp
 
 from nlsolve.contracts.linear_solver import Factors, LinearSolver
