@@ -173,7 +173,7 @@ class Registry:
         for cls in map(_checked, classes):
             offer = _Offer(cls, source, source.partition(" ")[0])
             others = self._offers.setdefault((cls.noun, cls.kind_name()), [])
-            if all(other.cls is not cls for other in others):
+            if offer not in others:
                 others.append(offer)
         self._usable.clear()
 

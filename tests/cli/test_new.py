@@ -33,11 +33,12 @@ def test_the_test_that_is_written_passes(contract: str, tmp_path: Path, monkeypa
     assert code == 0
     assert said.split("\n")[:3] == [str(tmp_path / name) for name in ("my_own.py", "my_own.toml", "test_my_own.py")]
     monkeypatch.syspath_prepend(str(tmp_path))
-    monkeypatch.delitem(sys.modules, "my_own", raising=False)
-    tests = runpy.run_path(str(tmp_path / "test_my_own.py"))
-    tests["test_it_keeps_its_contract"]()
-    tests["test_its_study_runs"]()
-    monkeypatch.delitem(sys.modules, "my_own")
+    try:
+        tests = runpy.run_path(str(tmp_path / "test_my_own.py"))
+        tests["test_it_keeps_its_contract"]()
+        tests["test_its_study_runs"]()
+    finally:
+        sys.modules.pop("my_own", None)
 
 
 def test_every_contract_has_a_template() -> None:
