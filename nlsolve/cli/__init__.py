@@ -1,4 +1,4 @@
 """The command line: data on standard output, all else on standard error.
 
-It may import contracts, registry, results, flow, show, study and running.
+It may import contracts, registry, results, flow, show, study, running and testing.
 """

@@ -31,6 +31,8 @@ from nlsolve.cli.options import (
     default_folder,
     registry_of,
 )
+from nlsolve.cli.plugins.check import check
+from nlsolve.cli.plugins.new import new
 from nlsolve.cli.printing import (
     count,
     left_out,
@@ -253,4 +255,6 @@ def statuses(words: list[str]) -> list[Status]:
     return [Status.of(word) for word in words]
 
 
+app.command()(check)
+app.command()(new)
 app.add_typer(folders)

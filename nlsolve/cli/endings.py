@@ -18,6 +18,7 @@ class ExitCode(IntEnum):
 
     COMPLETE = 0
     CRASHED = 1
+    BROKEN = 1  # a plugin does not keep its contract
     INVALID = 2
     NOT_FOUND = 3
     INTERRUPTED = 130

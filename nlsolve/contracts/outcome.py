@@ -34,6 +34,7 @@ class Outcome:
     seconds : the time [s] that each kind of work took, "own" for the method's own arithmetic; their sum is the time
         spent in the method.
     newton_correction : max_j |Δu_j| over the size of u_j, where the driver has needed it to judge the state; else NaN.
+    idle : number of steps to another state for which the method has asked for no work that is counted.
     """
 
     status: Status
@@ -48,6 +49,7 @@ class Outcome:
     seconds: Mapping[str, float] = field(default_factory=dict)
     residual_absolute: float = float("nan")
     newton_correction: float = float("nan")
+    idle: int = 0
 
     @property
     def converged(self) -> bool:

@@ -117,6 +117,8 @@ class Start(Component):
                     "such as [1e-4, 1e-2]"
                 )
             return [Stage(law, load, load) for load in path]
+        if not self.values and self.by not in law.continued_by:  # there is nothing to continue by
+            return [Stage(law, 1.0, 1.0)]
         stages = [Stage(each, 1.0, getattr(each, self.by)) for each in law.continuation(self.by, self.values)]
         if self.adaptive and not min(stage.value for stage in stages) > 0.0:
             raise ValueError(

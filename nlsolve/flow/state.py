@@ -17,6 +17,7 @@ from nlsolve.contracts.linear_solver import LinearSolver
 from nlsolve.contracts.rules.predictor import Predictor
 from nlsolve.contracts.scene import Entry
 from nlsolve.flow.accuracy.enrichment import Enriched
+from nlsolve.flow.claims.shapes import check_law, check_operators, check_velocity
 from nlsolve.flow.continuation import Start
 from nlsolve.flow.convection import Convection
 from nlsolve.flow.momentum import Flow, Inertia
@@ -73,8 +74,11 @@ class FlowState:
         self.unknowns: Array
 
     def begin(self, cloud: Cloud) -> None:
-        """Set the cloud at t = 0, build its operators, and start from rest. May raise SolveError (bad cloud)."""
+        """Set the cloud at t = 0, build its operators, and start from rest. May raise SolveError (bad cloud), and
+        TypeError, which names the plugin, for operators and viscosities of other shapes than their contracts'.
+        """
         self.cloud = cloud
+        check_law(self.parts.law)
         if self.parts.motion.moving:
             self.moving = MovingNodes(
                 self.parts.scene, self.parts.motion, self.parts.time.increment, self.discretizer, cloud
@@ -124,6 +128,7 @@ class FlowState:
             else:
                 self.operators = self.moving.operators(self.cloud, self.volumetric)
             self.gradient = self.parts.discretizer.gradient(self.cloud) if self.parts.physics.convection else None
+        check_operators(self.parts.discretizer, self.operators, self.cloud)
         if before is not None:
             self.pressure = self.between_volume_points(before, self.operators) @ self.pressure
 
@@ -154,7 +159,8 @@ class FlowState:
             self.cloud,
             operators,
             law,
-            load * self.scene.boundary_velocity(self.cloud, law, self.time),
+            load
+            * check_velocity(self.scene.called(), self.scene.boundary_velocity(self.cloud, law, self.time), self.cloud),
             modulus,
             self.pressure,
             inertia,

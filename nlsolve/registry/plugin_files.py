@@ -1,4 +1,4 @@
-"""Plugins of one file, which need no installation: a study names them, or --plugin does."""
+"""Plugins without installation: files that a study or --plugin names, and classes that are given from Python."""
 
 from __future__ import annotations
 
@@ -18,6 +18,9 @@ from nlsolve.registry.registry import CONTRACTS, Registry, sentence_of
 
 DIGEST_LETTERS = 8
 
+Plugin = str | Path | type[Component]
+"""A plugin that needs no installation: the path of a file, or a component class."""
+
 
 def with_files(registry: Registry, paths: Iterable[Path]) -> Registry:
     """A registry that also has the components of these files. Raises StudyError for a file that cannot be used."""
@@ -31,6 +34,22 @@ def with_files(registry: Registry, paths: Iterable[Path]) -> Registry:
             registry = registry.with_(_offered_by(module), source, file)
         except Exception as error:  # a stranger's hook may raise anything
             raise StudyError(f"the plugin {path} cannot be registered: {sentence_of(error)}") from error
+    return registry
+
+
+def with_plugins(registry: Registry, plugins: Iterable[Plugin]) -> Registry:
+    """A registry that also has these classes, and the components of these files.
+
+    Raises StudyError for a file or a class that cannot be used.
+    """
+    for plugin in plugins:
+        if isinstance(plugin, str | Path):
+            registry = with_files(registry, [Path(plugin)])
+            continue
+        try:
+            registry = registry.with_([plugin], getattr(plugin, "__module__", "Python"))
+        except TypeError as error:
+            raise StudyError(f"the plugin {plugin!r} cannot be registered: {error}") from error
     return registry
 
 

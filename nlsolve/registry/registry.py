@@ -172,18 +172,20 @@ class Registry:
         """Take up component classes. Raises TypeError for a class that no study can ask for."""
         for cls in map(_checked, classes):
             offer = _Offer(cls, source, source.partition(" ")[0])
-            self._offers.setdefault((cls.noun, cls.kind_name()), []).append(offer)
+            others = self._offers.setdefault((cls.noun, cls.kind_name()), [])
+            if offer not in others:
+                others.append(offer)
         self._usable.clear()
 
-    def with_(self, classes: Iterable[type[Component]], source: str, file: Path) -> Registry:
-        """A registry that has the classes of a file as well; `files` are all such files.
+    def with_(self, classes: Iterable[type[Component]], source: str, file: Path | None = None) -> Registry:
+        """A registry that has these classes as well, of a file or of none; `files` are all such files.
 
         Raises TypeError for a class that no study can ask for.
         """
         wider = copy(self)
         wider._offers = {name: list(offers) for name, offers in self._offers.items()}
         wider._usable = {}
-        wider.files = (*self.files, file)
+        wider.files = self.files if file is None else (*self.files, file)
         wider.offer(classes, source)
         return wider
 
@@ -325,6 +327,7 @@ class Registry:
             raise PydanticCustomError("contract_wrong", message, told)
         try:
             cls.kind_name()
+            _check_properties(cls)
         except TypeError as error:
             raise PydanticCustomError("kind_undeclared", "{reason}", {"reason": str(error)}) from error
 
@@ -442,7 +445,21 @@ def _checked(cls: Any) -> type[Component]:
         raise TypeError(f'{cls.__name__} must declare its name: kind: Literal["name"] = "name"')
     if QUALIFIED in kind:
         raise TypeError(f"{cls.__name__} has the kind {kind!r}: a kind has no {QUALIFIED!r}, which packages end with")
+    _check_properties(cls)
     return cls
+
+
+def _check_properties(cls: type[Component]) -> None:
+    """Raises TypeError where the contract has a property and `cls` a method, or the other way round: whoever reads the
+    one would get a function, and whoever calls the other would call a value.
+    """
+    bases = [base for base in cls.__mro__ if issubclass(base, Component)]
+    for name, promised in ((name, thing) for base in bases for name, thing in vars(base).items()):
+        given = inspect.getattr_static(cls, name, None)
+        if isinstance(promised, property) and inspect.isfunction(given):
+            raise TypeError(f"{cls.__name__}.{name} is a method, and should be a property: write @property above it")
+        if inspect.isfunction(promised) and isinstance(given, property):
+            raise TypeError(f"{cls.__name__}.{name} is a property, and should be a method: leave @property out")
 
 
 def parameters_of(cls: type[Component]) -> tuple[Parameter, ...]:

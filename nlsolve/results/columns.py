@@ -278,8 +278,8 @@ RUNS = _by_name(
     ),
     Column(
         "doubt",
-        "what the audits, a system's roots, or work in other processes put in doubt, and the way out; empty when "
-        "nothing",
+        "what the audits, a system's roots, steps without counted work, or work in other processes put in doubt, and "
+        "the way out; empty when nothing",
     ),
 )
 """`runs`: a row a case, whatever its ending. Behind these stand all parameters of the case, dotted ("solver.order")."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import cache
@@ -20,8 +20,9 @@ from nlsolve.contracts.problem import NonlinearProblem
 from nlsolve.contracts.rules.operator import IterationOperator
 from nlsolve.contracts.rules.refresh import RefreshRule
 from nlsolve.contracts.status import InputError, SolveError
+from nlsolve.registry.plugin_files import Plugin, with_plugins
 from nlsolve.registry.problems import Problem, Source, problems_in
-from nlsolve.registry.registry import load_registry
+from nlsolve.registry.registry import Registry, load_registry
 from nlsolve.series import Array
 from nlsolve.solving.stopping import Budget, StoppingTest
 from nlsolve.study.case import claims_missing
@@ -161,30 +162,49 @@ def _check_pattern(caller: str, compressed: FormulaProblem, full: FormulaProblem
         )
 
 
-@cache
-def _model() -> type[BaseModel]:
+def _model(registry: Registry) -> type[BaseModel]:
     """The pydantic model of a strategy: the sections that a study has for it."""
-    registry = load_registry()
     parts: dict[str, Any] = {noun: (registry.union(noun), ...) for noun in ("solver", "linear", "refresh", "operator")}
     parts |= {"stop": (StoppingTest, StoppingTest()), "budget": (Budget, Budget())}
     return create_model("Strategy", __config__=ConfigDict(extra="forbid", frozen=True), **parts)
 
 
-def strategy_of(caller: str, solver: Any, linear: Any, refresh: Any, operator: Any, stop: Any, budget: Any) -> Strategy:
-    """The strategy that the arguments describe. Raises InputError with a sentence for each wrong argument."""
+@cache
+def _model_of_installed() -> type[BaseModel]:
+    return _model(load_registry())
+
+
+def strategy_of(
+    caller: str,
+    solver: Any,
+    linear: Any,
+    refresh: Any,
+    operator: Any,
+    stop: Any,
+    budget: Any,
+    plugins: Iterable[Plugin] = (),
+) -> Strategy:
+    """The strategy that the arguments describe. Raises InputError with a sentence for each wrong argument.
+
+    plugins : classes and files whose kinds the arguments may name besides the installed ones.
+    """
+    brought = tuple(plugins)
+    registry = with_plugins(load_registry(), brought)
+    model = _model(registry) if brought else _model_of_installed()
     by_kind = {"solver": solver, "linear": linear, "refresh": refresh, "operator": operator}
     document = {name: {"kind": value} if isinstance(value, str) else value for name, value in by_kind.items()}
     if refresh is None:
-        named = load_registry().class_of("solver", document["solver"])
+        named = registry.class_of("solver", document["solver"])
         document["refresh"] = getattr(named, "default_refresh", NonlinearSolver.default_refresh)
     document |= {name: value for name, value in (("stop", stop), ("budget", budget)) if value is not None}
-    try:
-        made: Any = _model().model_validate(document)
-    except ValidationError as error:
-        problems = problems_in(error, _model(), document)
-    else:
-        strategy = Strategy(made.solver, made.linear, made.refresh, made.operator, made.stop, made.budget)
-        problems = claims_missing(strategy.solver, strategy.stop)
-        if not problems:
-            return strategy
+    with registry.in_use():
+        try:
+            made: Any = model.model_validate(document)
+        except ValidationError as error:
+            problems = problems_in(error, model, document)
+        else:
+            strategy = Strategy(made.solver, made.linear, made.refresh, made.operator, made.stop, made.budget)
+            problems = claims_missing(strategy.solver, strategy.stop)
+            if not problems:
+                return strategy
     raise InputError("\n".join(problem.sentence(Source(caller)) for problem in problems))

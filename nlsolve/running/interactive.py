@@ -14,6 +14,7 @@ from nlsolve.contracts.outcome import Outcome
 from nlsolve.contracts.problem import NonlinearProblem
 from nlsolve.contracts.scene import Entry, Simulation, SingleSolve
 from nlsolve.contracts.status import InputError
+from nlsolve.registry.plugin_files import Plugin
 from nlsolve.results.columns import RUNS
 from nlsolve.running.checked_input import Formula, Given, Posed, Strategy, mistake, posed_problem, strategy_of
 from nlsolve.solving.simulate import Record, crashed, simulate
@@ -36,6 +37,7 @@ def solve(
     pattern: Any | None = None,
     jacobian: Formula | None = None,
     typical_sizes: ArrayLike | None = None,
+    plugins: Iterable[Plugin] = (),
 ) -> Outcome:
     """Solve F(u) = 0 from `start`.
 
@@ -51,11 +53,14 @@ def solve(
     jacobian : for a function that is not analytic: u -> J(u), dense or sparse (U, U).
     typical_sizes : for a function: sizes (U,) beside which an unknown that is small counts as zero; without them the
         size it began with.
+    plugins : component classes, and paths of files with such, whose kinds the other arguments may name.
 
     The `Outcome` says how the solve ended, a failure too. Raises InputError for arguments that cannot be used.
     """
     posed = posed_problem("nlsolve.solve", problem, start, pattern, jacobian, typical_sizes)
-    return _solved(posed, strategy_of("nlsolve.solve", solver, linear, refresh, operator, stop, budget)).outcome
+    return _solved(
+        posed, strategy_of("nlsolve.solve", solver, linear, refresh, operator, stop, budget, plugins)
+    ).outcome
 
 
 def compare(
@@ -71,6 +76,7 @@ def compare(
     pattern: Any | None = None,
     jacobian: Formula | None = None,
     typical_sizes: ArrayLike | None = None,
+    plugins: Iterable[Plugin] = (),
 ) -> pd.DataFrame:
     """Solve one problem from one start with each of `solvers`: one row for each, with the columns of `runs` that apply.
 
@@ -80,13 +86,13 @@ def compare(
     The other arguments are those of `solve`. A method that fails, or crashes, gives a row that says so. Raises
     InputError for arguments that cannot be used.
     """
-    caller = "nlsolve.compare"
+    caller, brought = "nlsolve.compare", tuple(plugins)
     posed = posed_problem(caller, problem, start, pattern, jacobian, typical_sizes)
     if isinstance(solvers, str | Component) or not solvers or (isinstance(solvers, Mapping) and "kind" in solvers):
         raise mistake(caller, "solvers", solvers, 'should be a list or a dictionary of them, such as ["newton", "anm"]')
     named = solvers if isinstance(solvers, Mapping) else None
     chosen = [
-        strategy_of(caller, solver, linear, refresh, operator, stop, budget)
+        strategy_of(caller, solver, linear, refresh, operator, stop, budget, brought)
         for solver in (solvers if named is None else named.values())
     ]
     names = [_label(strategy.solver) for strategy in chosen] if named is None else list(named)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -20,6 +20,7 @@ from nlsolve.flow.momentum import Flow
 from nlsolve.flow.motion.markers import LOST, within
 from nlsolve.flow.observables import nodal_fields
 from nlsolve.flow.state import FlowParts
+from nlsolve.registry.plugin_files import Plugin
 from nlsolve.registry.problems import StudyError
 from nlsolve.running.runner import study_of
 from nlsolve.series import Array
@@ -99,17 +100,19 @@ def march(
     overrides: Mapping[str, Any] | None = None,
     quick: bool = False,
     listen: Callable[[Progress], None] | None = None,
+    plugins: Iterable[Plugin] = (),
 ) -> March:
     """March the flow of a study with one case; nothing is written.
 
     study : as for `run`; a dictionary needs no question, and its sections may be instances.
     listen : is called with a `Progress` after every increment.
+    plugins : component classes, and paths of files with such, whose kinds the study may name.
 
     Raises StudyError for a study that is not valid or has several cases, InputError for a scene that is no flow.
     """
     if isinstance(study, Mapping):
         study = {"question": "What does the flow look like?", **study}
-    chosen = study_of(study, overrides, quick)
+    chosen = study_of(study, overrides, quick, plugins)
     if len(chosen.cases) != 1:
         raise StudyError(
             f"{chosen.name}: a march is of one case, and the study has {len(chosen.cases)}: drop its sweeps"

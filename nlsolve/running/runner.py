@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import shlex
 import time
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from contextlib import closing
 from dataclasses import dataclass, replace
 from datetime import date
@@ -15,7 +15,9 @@ from typing import Any
 import pandas as pd
 
 from nlsolve.contracts.status import Status
+from nlsolve.registry.plugin_files import Plugin, with_plugins
 from nlsolve.registry.problems import StudyError, did_you_mean
+from nlsolve.registry.registry import load_registry
 from nlsolve.results.frames import Frames, Part, rows_of
 from nlsolve.running.engines.choice import counter_for, engine_for
 from nlsolve.running.engines.engine import Engine, Event, Listener
@@ -95,6 +97,7 @@ def run(
     skip: str | Collection[str] = (),
     failed: bool = False,
     shard: str | None = None,
+    plugins: Iterable[Plugin] = (),
 ) -> Results:
     """Run every case of a study that has not been run before, and keep the results in `out` (None: in memory).
 
@@ -111,6 +114,7 @@ def run(
         pattern, several joined by " and "; a status ("timed out"; "left" for no ending yet); or the id of a case.
     failed : run only the cases that crashed or were stopped at a limit when they were run last, again.
     shard : "i/n": run every n-th case of the study's order, from the i-th on. n shards have all cases.
+    plugins : component classes, and paths of files with such, whose kinds the study may name.
 
     The results have whatever is finished of the study, and a note says how much of it that is.
     An interruption loses only the cases that are running; the same call later runs those that are left.
@@ -118,7 +122,7 @@ def run(
     Raises StudyError for a study that is not valid and for settings that do not go together, StoreError for a folder
     that cannot hold its results.
     """
-    study = study_of(study, overrides, quick)
+    study = study_of(study, overrides, quick, plugins)
     chosen_engine = engine_for(study.timing, isolation, jobs, debugger, engine, scheduler)
     portion = portion_of(study, only, skip, failed, shard)
     counter, counting = counter_for(study.timing, jobs), replace(study, timing=Timing(clock=study.timing.clock))
@@ -186,18 +190,27 @@ def load(folder: str | Path) -> Results:
     return Results(study, frames.runs, frames.steps, frames.fields, place, notes)
 
 
-def study_of(study: Study | str | Path | Mapping[str, Any], overrides: Mapping[str, Any] | None, quick: bool) -> Study:
+def study_of(
+    study: Study | str | Path | Mapping[str, Any],
+    overrides: Mapping[str, Any] | None,
+    quick: bool,
+    plugins: Iterable[Plugin] = (),
+) -> Study:
     """`study` itself, or the study in a dictionary or a TOML file.
 
-    Raises StudyError for a study that is not valid, and for a `Study` given together with `overrides` or `quick`.
+    Raises StudyError for a study or a plugin that is not valid, and for a `Study` given together with `overrides`,
+    `quick` or `plugins`.
     """
+    brought = tuple(plugins)
     if isinstance(study, Study):
-        if overrides or quick:
-            raise StudyError(f"{study.name}: overrides and quick are applied when a study is read, not when it is run")
+        if overrides or quick or brought:
+            sentence = "overrides, quick and plugins are applied when a study is read, not when it is run"
+            raise StudyError(f"{study.name}: {sentence}")
         return study
+    registry = with_plugins(load_registry(), brought) if brought else None
     if isinstance(study, Mapping):
-        return Study.from_dict(study, overrides, quick)
-    return Study.from_toml(study, overrides, quick)
+        return Study.from_dict(study, overrides, quick, registry)
+    return Study.from_toml(study, overrides, quick, registry)
 
 
 def _merged(study: Study, parts: Mapping[str, Part]) -> Frames:

@@ -21,6 +21,7 @@ from nlsolve.solving.stopping import Budget, StoppingTest
 from nlsolve.solving.tangent import Tangent
 from nlsolve.solving.work.counted_problem import CountedProblem
 from nlsolve.solving.work.ledger import Ledger
+from nlsolve.solving.work.promises import checked_residual, checked_step
 
 GROWTH_OF_DIVERGENCE = 1e6  # residual over the larger of its first value and its scale
 PATIENCE = 40  # steps without a new smallest residual, by any of its sizes, after which a method has stagnated
@@ -40,7 +41,7 @@ def solve(
 
     After every step the driver measures ‖R_new‖/‖R_old‖ for the table of steps and for the refresh rule of `tangent`.
     A SolveError of the method becomes the status of the outcome, as does the limit at which the case is stopped; any
-    other error is raised.
+    other error is raised, as is a TypeError for what is no state or no residual (`nlsolve.solving.work.promises`).
     """
     counted = CountedProblem(problem, ledger, tangent.operator)
     begun, renewals, withheld = ledger.copy(), tangent.renewals, tangent.withheld
@@ -49,6 +50,7 @@ def solve(
     before, rows = start, list[dict[str, Any]]()
     residual_norm = size = np.inf
     claimed = denied = False
+    idle = 0
 
     def ended(status: Status, detail: str = "") -> Outcome:
         blame: Mapping[str, float] = {}
@@ -71,6 +73,7 @@ def solve(
             spent.timed(),
             rows[-1]["residual_absolute"] if rows else np.inf,
             measure.correction,
+            idle,
         )
 
     def is_solved(state: Array) -> bool:
@@ -92,6 +95,7 @@ def solve(
     first, best = np.inf, np.full(3, np.inf)
     since_best = 0
     for number in range(budget.iterations + 1):
+        worked = ledger.counts.total() - ledger.counts["method"]
         try:
             with ledger.entry("method"):
                 step = next(iterator, None)
@@ -106,7 +110,12 @@ def solve(
             return ended(limit.status, limit.detail)
         if step is None:
             return ended(Status.STAGNATED, "the method stopped by itself before the stopping test was met")
-        residual = counted.uncounted_residual(step.state)
+        state = checked_step(step, start, solver).state
+        residual = counted.uncounted_residual(state)
+        if not number:
+            checked_residual(residual, start, problem)
+        elif ledger.counts.total() - ledger.counts["method"] == worked and not np.array_equal(state, before):
+            idle += 1
         size_before, size = size, measure.size(residual)
         residual_norm, progress = measure.relative(step.state, residual), size / measure.scale
         contraction = (size / size_before if size_before else 0.0) if number else None

@@ -171,7 +171,7 @@ class _Run:
         self.tangent = Tangent(method.linear, method.refresh, self.ledger, operator=self.operator)
         self.simulation = build(self.ledger.entry)
         self.rows: list[dict[str, Any]] = []
-        self.increments = self.iterations = 0
+        self.increments = self.iterations = self.idle = 0
         self.time = 0.0
         self.validity_time: float | None = None
         self.residual_norm = self.residual_absolute = self.newton_correction = float("nan")
@@ -218,6 +218,7 @@ class _Run:
             self.tangent = Tangent(method.linear, method.refresh, self.ledger, self.walk.ordered(), self.operator)
         outcome = solve(task.problem, method.solver, self.tangent, task.start, method.stop, method.budget, self.ledger)
         self.iterations += outcome.iterations
+        self.idle += outcome.idle
         self.false_convergence += outcome.claimed_wrongly
         self.false_failure += outcome.denied_wrongly
         self.blame = outcome.blame
@@ -283,8 +284,20 @@ class _Run:
             "residual_norm": self.residual_norm,
             "residual_absolute": self.residual_absolute,
             **({} if np.isnan(self.newton_correction) else {"newton_correction": self.newton_correction}),
-            **run_columns({**self.simulation.sizes, **self.simulation.measured(outcome)}),
+            **self.columns(outcome),
         }
+
+    def columns(self, outcome: Outcome) -> dict[str, Any]:
+        """What the simulation measures; work that the ledger cannot see is a reason for doubt."""
+        found = run_columns({**self.simulation.sizes, **self.simulation.measured(outcome)})
+        if not self.idle:
+            return found
+        reason = (
+            f"the solver {self.method.solver.called()!r} took {self.idle} of {self.iterations} steps with no counted "
+            "work (residuals, Jacobians, solves, coefficients), so that its counts tell less than it did: ask "
+            "`problem` and `tangent` for all of it"
+        )
+        return found | {"doubt": "; ".join(filter(None, (found.get("doubt"), reason)))}
 
 
 def crashed(error: BaseException) -> dict[str, Any]:

@@ -10,7 +10,7 @@ from typing import Any
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from nlsolve.registry.plugin_files import with_files
+from nlsolve.registry.plugin_files import with_plugins
 from nlsolve.registry.problems import ABSENT, Problem, Source, StudyError, problems_in, unknown
 from nlsolve.registry.registry import Registry, load_registry
 from nlsolve.registry.toml_lines import Place
@@ -107,7 +107,8 @@ class Study:
         registry: Registry | None = None,
         name: str = "study",
     ) -> Study:
-        """The study in a dictionary. Its sections and swept values may be component instances, installed or not.
+        """The study in a dictionary. Its sections and swept values may be component instances, installed or not, and
+        its `plugins` classes, whose kinds can then be written.
 
         Raises StudyError as `from_toml` does.
         """
@@ -123,12 +124,15 @@ def _built(
     name: str,
 ) -> Study:
     """The study of a document, in which components inside components are those of the same registry."""
-    paths = document.get(PLUGINS, [])
-    for number, path in enumerate(paths if isinstance(paths, list | tuple) else []):
+    given = document.get(PLUGINS, [])
+    plugins = given if isinstance(given, list | tuple) else []
+    for number, plugin in enumerate(plugins):
         try:
-            registry = with_files(registry, [Path(path)] if isinstance(path, str) else [])
+            registry = with_plugins(registry, [plugin] if isinstance(plugin, str | type) else [])
         except StudyError as error:
             raise StudyError(f"{source.at((PLUGINS, number))}: {PLUGINS}[{number}]: {error}") from error
+    if any(isinstance(plugin, type) for plugin in plugins):  # taken up; the others are checked with all other entries
+        document = {**document, PLUGINS: [plugin for plugin in plugins if not isinstance(plugin, type)]}
     with registry.in_use():
         return _Builder(source, document, overrides, quick, registry).study(name)
 

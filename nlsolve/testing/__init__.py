@@ -6,12 +6,13 @@
 A check takes an instance, runs it through what its contract promises, and raises AssertionError with a sentence that
 says which promise was broken and by how much. The numbers it draws are seeded: a check fails always or never.
 
-It may import series, contracts, solving, flow and algebra.
+It may import series, contracts, registry, solving, flow and algebra.
 """
 
 from __future__ import annotations
 
 from nlsolve.testing.discretizers import check_discretizer
+from nlsolve.testing.kit.toys import ToyLaw, toy_cloud
 from nlsolve.testing.laws import check_law
 from nlsolve.testing.linear_solvers import check_linear_solver
 from nlsolve.testing.problems import check_problem
@@ -27,6 +28,7 @@ from nlsolve.testing.scenes import check_scene, check_system
 from nlsolve.testing.solvers import check_solver
 
 __all__ = [
+    "ToyLaw",
     "check_discretizer",
     "check_globalization",
     "check_homotopy_form",
@@ -40,4 +42,5 @@ __all__ = [
     "check_scene",
     "check_solver",
     "check_system",
+    "toy_cloud",
 ]

@@ -8,6 +8,7 @@ import numpy as np
 
 from nlsolve.contracts.problem import NonlinearProblem
 from nlsolve.series import Array, Series
+from nlsolve.testing.kit.verdicts import promise
 from nlsolve.testing.promises import ORDER, PARTS, check_coefficients, norm, require, same
 
 
@@ -17,15 +18,18 @@ def check_problem(problem: NonlinearProblem, u: Array, tolerance: float = 1e-6) 
     """
     random = np.random.default_rng(0)
     size = norm(u) / np.sqrt(len(u)) or 1.0
-    jacobian = problem.jacobian(u)
-    for _ in range(3):
-        d = random.standard_normal(len(u)) * size
-        product = jacobian @ d
-        steps = [(problem.residual(u + h * d) - problem.residual(u - h * d)) / (2.0 * h) for h in PARTS]
-        off = min(norm(product - difference) for difference in steps) / norm(product)
-        require(off <= tolerance, f"the Jacobian is off by {off:.1e} from central differences, allowed {tolerance:g}")
+    with promise("jacobian", f"J d is that of central differences of R, to {tolerance:g}"):
+        jacobian = problem.jacobian(u)
+        for _ in range(3):
+            d = random.standard_normal(len(u)) * size
+            product = jacobian @ d
+            steps = [(problem.residual(u + h * d) - problem.residual(u - h * d)) / (2.0 * h) for h in PARTS]
+            off = min(norm(product - difference) for difference in steps) / norm(product)
+            told = f"the Jacobian is off by {off:.1e} from central differences, allowed {tolerance:g}"
+            require(off <= tolerance, told)
     if problem.has_series:
-        _check_series(problem, u, jacobian, size, random)
+        with promise("expansion", f"R along a path has the first {ORDER} Taylor coefficients of its values"):
+            _check_series(problem, u, jacobian, size, random)
 
 
 def _check_series(problem: NonlinearProblem, u: Array, jacobian: Any, size: float, random: np.random.Generator) -> None:

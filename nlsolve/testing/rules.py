@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 
@@ -18,7 +19,8 @@ from nlsolve.series import Array
 from nlsolve.solving.matrices import CheckedOperator
 from nlsolve.solving.tangent import Tangent
 from nlsolve.solving.work.ledger import Ledger
-from nlsolve.testing.promises import norm, require, same
+from nlsolve.testing.kit.verdicts import promise
+from nlsolve.testing.promises import norm, require, same, shaped
 from nlsolve.testing.toy_problem import DenseLU, ToyProblem
 
 
@@ -37,16 +39,23 @@ def check_globalization(globalization: Globalization) -> None:
         direction = -np.linalg.solve(problem.jacobian(state).toarray(), residual)
         given = [state.copy(), residual.copy(), direction.copy()]
         length, found = globalization.search(problem).length(problem, state, residual, direction)
-        require(length > 0.0, f"a step length of {length}")
-        expected = problem.residual(state + length * direction)
-        same(found, expected, norm(expected), "the residual at the end of the step")
-        unchanged = all(map(np.array_equal, given, (state, residual, direction)))
-        require(unchanged, "the search changed the state, the residual or the direction it was given")
+        with promise("length", "the step length is a positive finite number"):
+            require(0.0 < length < np.inf, f"a step length of {length}")
+        with promise("residual", "the residual that comes with it is that of the state at the end of the step"):
+            expected = problem.residual(state + length * direction)
+            shaped(found, expected.shape, "the residual at the end of the step")
+            same(found, expected, norm(expected), "the residual at the end of the step")
+        with promise("no mutation", "neither the state nor the residual nor the direction is changed"):
+            unchanged = all(map(np.array_equal, given, (state, residual, direction)))
+            require(unchanged, "the search changed the state, the residual or the direction it was given")
         return length
 
-    require(first(0.01) == 1.0, "a full step of Newton near the solution was not taken")
+    with promise("full step", "near the solution Newton's full step is taken"):
+        require(first(0.01) == 1.0, "a full step of Newton near the solution was not taken")
     for far in (0.5, 5.0):
-        require(first(far) == first(far), "the first length of a second solve is another: what is kept is of one solve")
+        with promise("determinism", "one solve remembers nothing of another"):
+            again = first(far) == first(far)
+            require(again, "the first length of a second solve is another: what is kept is of one solve")
 
 
 def check_predictor(predictor: Predictor) -> None:
@@ -55,15 +64,23 @@ def check_predictor(predictor: Predictor) -> None:
     The guess of a steady flow is that flow, to 1e-12. A guess has the shape of the velocities, does not change them,
     and is the same each time. Raises AssertionError.
     """
-    require(predictor.depth >= 1, f"a depth of {predictor.depth}: at least the last increment is looked at")
+    with promise("depth", "depth is a property, a number ≥ 1"):
+        depth: Any = predictor.depth
+        require(not callable(depth), "depth is a method: write @property above it, so that it is read")
+        require(depth >= 1, f"a depth of {depth}: at least the last increment is looked at")
     steady = np.random.default_rng(0).standard_normal((7, 2))
     for known in range(1, predictor.depth + 1):
         past = [steady.copy() for _ in range(known)]
-        guess = predictor.guess(past)
-        require(guess.shape == steady.shape, f"a guess of shape {guess.shape} for velocities of {steady.shape}")
-        same(guess, steady, 1.0, f"the guess of a steady flow from {known} increments", 1e-12)
-        require(all(np.array_equal(v, steady) for v in past), "the predictor changed the velocities it looked at")
-        require(np.array_equal(predictor.guess(past), guess), "guess changed its mind: it may look at the past only")
+        with promise("shape", "a guess has the shape of the velocities"):
+            guess = predictor.guess(past)
+            require(guess.shape == steady.shape, f"a guess of shape {guess.shape} for velocities of {steady.shape}")
+        with promise("steady", "the guess of a steady flow is that flow, to 1e-12"):
+            same(guess, steady, 1.0, f"the guess of a steady flow from {known} increments", 1e-12)
+        with promise("no mutation", "the velocities are not changed"):
+            require(all(np.array_equal(v, steady) for v in past), "the predictor changed the velocities it looked at")
+        with promise("determinism", "a guess is the same each time"):
+            alike = np.array_equal(predictor.guess(past), guess)
+            require(alike, "guess changed its mind: it may look at the past only")
 
 
 def check_refresh_rule(rule: RefreshRule) -> None:
@@ -72,9 +89,11 @@ def check_refresh_rule(rule: RefreshRule) -> None:
     """
     for seen in (None, 0.0, 0.5, 1.0, 1e9, np.nan):
         for history in (TangentHistory(1, seen), TangentHistory(1, None, seen), TangentHistory(99, seen, seen)):
-            first, again = rule.due(history), rule.due(history)
-            require(isinstance(first, (bool, np.bool_)), f"due({history}) is {first!r}, not True or False")
-            require(first == again, f"due({history}) changed its mind: a rule may look at the history only")
+            with promise("answer", "due answers True or False to any history, also where nothing or NaN was observed"):
+                first, again = rule.due(history), rule.due(history)
+                require(isinstance(first, (bool, np.bool_)), f"due({history}) is {first!r}, not True or False")
+            with promise("determinism", "the same history gives the same answer"):
+                require(first == again, f"due({history}) changed its mind: a rule may look at the history only")
 
 
 class KnownBranch:
@@ -134,16 +153,24 @@ def check_range_rule(rule: RangeRule) -> None:
             case = f"of order {order} with terms that fall by {np.abs(q).max():.2g} each"
             ranges = []
             for tolerance in (1e-12, 1e-6, 1e-2):
-                found, again = rule.limit(branch, tolerance, True), rule.limit(branch, tolerance, True)
-                what = f"a_max = {found.a_max} for a branch {case} and η = {tolerance:g}"
-                require(found.a_max > 0.0, f"{what}: a range is positive or infinite")
-                require(found.a_max == again.a_max, f"{what} was {again.a_max} when it was asked again")
-                growing = rule.limit(branch, tolerance, False).a_max
-                require((growing >= 1.0) == (found.a_max >= 1.0), f"{what}, but {growing} where it will not be used")
+                what = f"a branch {case} and η = {tolerance:g}"
+                with promise("range", "a_max is positive or infinite"):
+                    found, again = rule.limit(branch, tolerance, True), rule.limit(branch, tolerance, True)
+                    what = f"a_max = {found.a_max} for {what}"
+                    require(found.a_max > 0.0, f"{what}: a range is positive or infinite")
+                with promise("determinism", "a_max of a branch is the same each time"):
+                    require(found.a_max == again.a_max, f"{what} was {again.a_max} when it was asked again")
+                with promise("unused", "whether the end of the path is reached does not depend on `used`"):
+                    growing = rule.limit(branch, tolerance, False).a_max
+                    alike = (growing >= 1.0) == (found.a_max >= 1.0)
+                    require(alike, f"{what}, but {growing} where it will not be used")
                 ranges.append(found.a_max)
-            require(ranges == sorted(ranges), f"a_max of a branch {case} falls where η grows: {ranges}")
-            require(ranges[0] < ranges[-1] or np.isinf(ranges[0]), f"a_max of a branch {case} does not grow with η")
-            require(all(map(np.array_equal, before, branch.numbers())), f"the rule changed a branch {case}")
+            with promise("growth", "a_max grows with η, or is infinite"):
+                require(ranges == sorted(ranges), f"a_max of a branch {case} falls where η grows: {ranges}")
+                grows = ranges[0] < ranges[-1] or np.isinf(ranges[0])
+                require(grows, f"a_max of a branch {case} does not grow with η")
+            with promise("no mutation", "the branch is not changed"):
+                require(all(map(np.array_equal, before, branch.numbers())), f"the rule changed a branch {case}")
 
 
 def check_homotopy_form(form: HomotopyForm) -> None:
@@ -157,14 +184,16 @@ def check_homotopy_form(form: HomotopyForm) -> None:
     kept = state.copy()
     for shift in (0.0, 0.2):
         matrix = problem.jacobian(state + shift).toarray()
-        recurrence = form.recurrence(problem, state)
-        first = problem.residual(state)
-        same(recurrence.right_hand_side(), -first, norm(first), "r_1, which is −G(0)")
+        with promise("first", "r_1 = −G(0)"):
+            recurrence = form.recurrence(problem, state)
+            first = problem.residual(state)
+            same(recurrence.right_hand_side(), -first, norm(first), "r_1, which is −G(0)")
         terms, rhs = list[Array](), list[Array]()
         for _ in range(order):
-            rhs.append(recurrence.right_hand_side().copy())
-            again = recurrence.right_hand_side()
-            require(np.array_equal(again, rhs[-1]), f"r_{len(rhs)} is another when it is asked for again")
+            with promise("again", "a right-hand side is the same when it is asked for again"):
+                rhs.append(recurrence.right_hand_side().copy())
+                again = recurrence.right_hand_side()
+                require(np.array_equal(again, rhs[-1]), f"r_{len(rhs)} is another when it is asked for again")
             terms.append(np.linalg.solve(matrix, rhs[-1]))
             recurrence.append(terms[-1])
 
@@ -173,12 +202,14 @@ def check_homotopy_form(form: HomotopyForm) -> None:
             g = problem.residual(state + weights @ np.array(terms))
             return norm(recurrence.miss(a, g, weights, rhs))
 
-        found = float(np.log2(missed(0.1) / missed(0.05)))
-        require(
-            abs(found - order - 1) <= 0.3,
-            f"W_1 … W_{order} leave O(a^{found:.2f}) in the homotopy, not O(a^{order + 1})",
-        )
-    require(np.array_equal(state, kept), "the form changed the state it was given")
+        with promise("order", "with W_1 … W_p the homotopy is met up to O(a^(p+1))"):
+            found = float(np.log2(missed(0.1) / missed(0.05)))
+            require(
+                abs(found - order - 1) <= 0.3,
+                f"W_1 … W_{order} leave O(a^{found:.2f}) in the homotopy, not O(a^{order + 1})",
+            )
+    with promise("no mutation", "the state is not changed"):
+        require(np.array_equal(state, kept), "the form changed the state it was given")
 
 
 def check_operator(
@@ -211,10 +242,17 @@ def check_operator(
             made.solved(posed, state)
         return found
 
-    first, again = march(), march()
-    require(np.array_equal(u, given) and np.array_equal(later, 1.01 * given), "the operator changed a state")
-    require(len(first) == len(again), "a second march renewed K* at other times than the first")
-    for mine, other in zip(first, again, strict=True):
-        same(mine, other, float(np.abs(mine).max()), "the K* of a second march")
-    if operator.is_tangent:
-        same(first[0], posed.jacobian(u).toarray(), float(np.abs(first[0]).max()), "K*, said to be the tangent,")
+    with promise("usable", "each K* is a square matrix of the problem's size, finite and invertible"):
+        first = march()
+    with promise("determinism", "two marches are alike: what is remembered is of one march"):
+        again = march()
+        require(len(first) == len(again), "a second march renewed K* at other times than the first")
+        for mine, other in zip(first, again, strict=True):
+            same(mine, other, float(np.abs(mine).max()), "the K* of a second march")
+    with promise("no mutation", "no state is changed"):
+        unchanged = np.array_equal(u, given) and np.array_equal(later, 1.01 * given)
+        require(unchanged, "the operator changed a state")
+    with promise("tangent", "K* of an operator that says is_tangent is J(u)"):
+        if operator.is_tangent:
+            expected = posed.jacobian(u).toarray()
+            same(first[0], expected, float(np.abs(first[0]).max()), "K*, said to be the tangent,")

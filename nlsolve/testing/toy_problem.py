@@ -6,11 +6,12 @@ from collections import Counter
 from typing import Any, ClassVar
 
 import numpy as np
-import scipy.linalg
+import scipy
 import scipy.sparse as sp
 
 from nlsolve.contracts.linear_solver import Factors, LinearSolver
 from nlsolve.contracts.problem import Expansion, NonlinearProblem
+from nlsolve.contracts.status import SolveError, Status
 from nlsolve.series import Array, Series
 
 
@@ -20,14 +21,19 @@ class DenseLU(LinearSolver):
     asked: ClassVar[Counter[str]] = Counter()
 
     def factorize(self, matrix: Any, previous: Factors | None = None) -> Factors:
-        """The dense factors of a sparse matrix (U, U)."""
+        """The dense factors of a sparse matrix (U, U). Raises SolveError for one that is singular or not finite."""
         self.asked["factorization"] += 1
-        return _DenseFactors(matrix)
+        dense = matrix.toarray()
+        if not np.isfinite(dense).all():
+            raise SolveError(Status.NON_FINITE, "the matrix is not finite")
+        if not 1.0 / np.linalg.cond(dense, 1) > np.finfo(float).eps:
+            raise SolveError(Status.SINGULAR_TANGENT, "the matrix is singular to working precision")
+        return _DenseFactors(dense)
 
 
 class _DenseFactors(Factors):
-    def __init__(self, matrix: Any) -> None:
-        self._lu = scipy.linalg.lu_factor(matrix.toarray())
+    def __init__(self, matrix: Array) -> None:
+        self._lu = scipy.linalg.lu_factor(matrix)
 
     def solve(self, rhs: Array) -> Array:
         DenseLU.asked["triangular_solve"] += 1

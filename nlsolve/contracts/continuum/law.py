@@ -62,7 +62,8 @@ class ConstitutiveLaw(Component, ABC):
         Raises ValueError when the law is not continued by this field.
         """
         if by not in self.continued_by:
-            fields = f"{', '.join(self.continued_by)} only" if self.continued_by else "none of its fields"
+            none = 'none of its fields: set values = [] to begin at rest, or by = "load" with values = [1e-4, 1e-2]'
+            fields = f"{', '.join(self.continued_by)} only" if self.continued_by else none
             raise ValueError(f"start.by = {by!r}: the law {self.kind_name()!r} is continued by {fields}")
         target = getattr(self, by)
         way = self.continued_by[by]

@@ -1,0 +1,1 @@
+"""The checks as a table: what each promises, whether it holds, and what components are checked on."""
