@@ -145,7 +145,7 @@ class FlowSimulation(Simulation):
         """Estimate the error of the state, and carry it to a cloud for the error asked for; False where that is reached
         already, or the limits allow no larger cloud. May raise SolveError.
         """
-        state, scene = self.state, self.parts.scene
+        state = self.state
         refused: SolveError | None = None
         with state.entry("estimate"):
             try:
@@ -160,7 +160,7 @@ class FlowSimulation(Simulation):
             return False
         here = state.cloud
         with state.entry("operators"):
-            cloud = scene.graded(adaptation.spacing(here, state.velocity, count), adaptation.asked)
+            cloud = adaptation.cloud(self.parts.scene, here, state.velocity, count)
             carry = carried(here, cloud)
         adaptation.rounds += 1
         state.carry_to(cloud, carry)

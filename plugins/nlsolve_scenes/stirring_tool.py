@@ -21,7 +21,7 @@ from nlsolve.plugin import (
 )
 from nlsolve_scenes.nodes.files import NodeFile
 from nlsolve_scenes.nodes.fronts import annulus
-from nlsolve_scenes.nodes.rings import ORBIT, SPIN, Auto, GradedRings, Rings, Scattered
+from nlsolve_scenes.nodes.rings import SPIN, Auto, GradedRings, Rings, Scattered, orbit
 
 Nodes = Annotated[Rings | GradedRings | Scattered | Auto | AdaptiveNodes | NodeFile, Field(discriminator="kind")]
 ON_CIRCLE = 1e-3  # largest distance of a wall node read from a file from its circle, in radii
@@ -93,7 +93,8 @@ class StirringTool(FlowScene):
             if isinstance(nodes, AdaptiveNodes):
                 nodes = Auto(spacing=nodes.spacing, middle=nodes.spacing, **BEFORE)
             if isinstance(nodes, Auto):
-                nodes = nodes.rings(self.layer(law), SPIN if self.motion == "spin" else ORBIT)
+                layer = self.layer(law)
+                nodes = nodes.rings(layer, SPIN if self.motion == "spin" else orbit(layer / self.tool_radius))
             return nodes.cloud(self.tool_radius, self.plate_radius)
         cloud = self.nodes.cloud(("tool", "plate"))
         for group, radius in (("tool", self.tool_radius), ("plate", self.plate_radius)):

@@ -14,8 +14,9 @@ from dataclasses import dataclass, field
 import numpy as np
 import scipy
 
-from nlsolve.contracts.continuum.adaptive import AdaptiveNodes, Spacing
+from nlsolve.contracts.continuum.adaptive import AdaptiveNodes
 from nlsolve.contracts.continuum.cloud import Cloud
+from nlsolve.contracts.continuum.geometry import Geometry
 from nlsolve.contracts.status import SolveError, Status
 from nlsolve.flow.accuracy.estimate import Comparison
 from nlsolve.flow.accuracy.spacing import wanted_spacing
@@ -28,6 +29,9 @@ SLOWEST, FASTEST = 1.25, 3.0
 
 WORTH = 1.1
 """A new cloud has more nodes than the last by this factor, or is not made."""
+
+FEWEST = 10
+"""Nodes with which no largest spacing can be kept: a cloud for fewer is not tried."""
 
 
 @dataclass
@@ -67,9 +71,14 @@ class Adaptation:
         count = min(round(growth * nodes), self.asked.most_nodes)
         return count if self.rounds < self.asked.most_rounds and count > WORTH * nodes else None
 
-    def spacing(self, cloud: Cloud, velocity: Array, count: int) -> Spacing:
-        """h(x) of the next cloud, from the `velocity` (N, 2) on this one."""
-        return wanted_spacing(cloud, velocity, count, self.asked.spacing)
+    def cloud(self, scene: Geometry, here: Cloud, velocity: Array, count: int) -> Cloud:
+        """The next cloud, of about `count` nodes, for the `velocity` (N, 2) `here`. May raise SolveError."""
+        most = self.asked.most_nodes
+        while True:
+            made = scene.graded(wanted_spacing(here, velocity, count, self.asked.spacing), self.asked)
+            if len(made.nodes) <= most or count <= FEWEST:
+                return made
+            count = int(count * most / len(made.nodes) / WORTH)
 
     def shortfall(self, nodes: int) -> str:
         """Why the error asked for is not reached, and the way out."""

@@ -121,10 +121,13 @@ class Grading:
 SPIN = Grading(0.75, 5.0, 0.15, 0.008, None)
 """One layer, all around the tool, and nothing beyond it."""
 
-ORBIT = Grading(0.7, 1.0, 0.135, 0.006, 0.115)
-"""A thinner layer, and lines beyond it on which the strain rate falls steeply. They turn with the tool's velocity, so
-that the spacing depends on the radius alone.
-"""
+
+def orbit(layer: float) -> Grading:
+    """For a layer of so many tool radii: a thinner one, and lines beyond it on which the strain rate falls steeply, at
+    a spacing of 0.168 n^(1/5) mm for the index n = √layer. The lines turn with the tool's velocity, so that the
+    spacing depends on the radius alone.
+    """
+    return Grading(0.7, 1.0, 0.15, 0.0066, 0.168 * layer**0.1)
 
 
 class Auto(NodeSet):
@@ -133,7 +136,7 @@ class Auto(NodeSet):
     The layer is the distance over which the strain rate at the tool falls by e; it follows from the law and the motion
     (see the scene). Evenly spaced nodes across a few layers reduce the error more than finer ones at the tool.
     `smallest` limits the number of nodes where the layer is very thin: in the spin for n < 0.015, in the orbit for
-    n < 0.075. The column `smallest_spacing` of the runs holds the first spacing chosen.
+    n < 0.08. The column `smallest_spacing` of the runs holds the first spacing chosen.
     """
 
     kind: Literal["auto"] = "auto"
@@ -143,14 +146,14 @@ class Auto(NodeSet):
     layers: float | None = Field(
         None, ge=0, description="width of the band before the spacing grows, in layers; absent: spin 5, orbit 1"
     )
-    growth: float | None = Field(
-        None, ge=0, description="growth of the spacing per mm beyond that band; absent: spin 0.15, orbit 0.135"
-    )
+    growth: float | None = Field(None, ge=0, description="growth of the spacing per mm beyond that band; absent: 0.15")
     spacing: float = Field(0.25, gt=0, description="largest spacing [mm]")
     middle: float | None = Field(
-        None, gt=0, description="largest spacing up to 3 mm from the tool [mm]; absent: spin as spacing, orbit 0.115"
+        None,
+        gt=0,
+        description="largest spacing up to 3 mm from the tool [mm]; absent: spin as spacing, orbit 0.168 n^(1/5)",
     )
-    smallest: float | None = Field(None, gt=0, description="least first spacing [mm]; absent: spin 0.008, orbit 0.006")
+    smallest: float | None = Field(None, gt=0, description="least first spacing [mm]; absent: spin 0.008, orbit 0.0066")
 
     def rings(self, layer: float, motion: Grading) -> GradedRings:
         """The graded rings for a layer [mm], with what is left out as the `motion` has it."""

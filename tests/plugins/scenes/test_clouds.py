@@ -204,20 +204,20 @@ def test_the_nodes_of_sides_are_at_equal_steps_of_the_spacing() -> None:
 
 @pytest.mark.parametrize("index", [1.0, 0.3, 0.1324, 0.05, 0.02])
 def test_auto_starts_with_a_part_of_the_layer_of_a_power_law(index: float) -> None:
-    """first = 0.75 r_t n/2 in the spin, 0.7 r_t n² in the orbit, between `smallest` and `spacing`, or `middle`."""
+    """first = 0.75 r_t n/2 in the spin, 0.7 r_t n² in the orbit, between `smallest` and `spacing` or `middle`."""
     law = PowerLaw(index=index, regularization=1e-6)
     for motion, wanted, smallest, largest in (
         ("spin", 0.75 * 1.5 * index / 2.0, 0.008, 0.25),
-        ("orbit", 0.7 * 1.5 * index**2, 0.006, 0.115),
+        ("orbit", 0.7 * 1.5 * index**2, 0.0066, 0.168 * min(index, 0.75**0.5) ** 0.2),
     ):
         cloud = StirringTool(motion=motion, nodes=Auto()).cloud(law)
         first = min(max(wanted, smallest), largest)
         assert cloud.nearest_distance.min() == pytest.approx(first, rel=0.07)
-        assert len(cloud.nodes) < 20_000
+        assert len(cloud.nodes) < 25_000
 
 
 def test_auto_has_at_most_ten_thousand_nodes_for_the_orbit_of_the_paper() -> None:
-    """The worst node off the walls is wrong by 0.49 % of the tool's speed there (finite elements of others)."""
+    """By finite elements of others its worst node is wrong by less than 0.5 % of the tool's speed."""
     assert 9_000 < len(StirringTool(motion="orbit", nodes=Auto()).cloud(LAW).nodes) < 10_000
 
 
