@@ -192,9 +192,14 @@ class FlowSimulation(Simulation):
         self.record_fields_if_due(flow)
 
     def prepare(self, stage: Stage) -> Solves:
-        """Yields the problem of one stage on the way to the first state."""
+        """Yields the problem of one stage on the way to the first state. On a cloud made from a solution it may take
+        all iterations of the budget: to go all the way again costs more.
+        """
         flow = self.state.flow_of(stage.law, load=stage.load)
-        preparation = self.parts.start.preparation(self.parts.budget.iterations)
+        most = self.parts.budget.iterations
+        preparation = self.parts.start.preparation(most)
+        if self.adaptation is not None and self.adaptation.rounds:
+            preparation = replace(preparation, iterations=most)
         return (yield Solve(flow, flow.unknowns(self.state.guess), preparation=preparation))
 
     def advance(self, k: int) -> Solves:

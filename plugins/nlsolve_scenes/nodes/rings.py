@@ -124,10 +124,10 @@ SPIN = Grading(0.75, 5.0, 0.15, 0.008, None)
 
 def orbit(layer: float) -> Grading:
     """For a layer of so many tool radii: a thinner one, and lines beyond it on which the strain rate falls steeply, at
-    a spacing of 0.168 n^(1/5) mm for the index n = √layer. The lines turn with the tool's velocity, so that the
+    a spacing of 0.17 n^(1/5) mm for the index n = √layer. The lines turn with the tool's velocity, so that the
     spacing depends on the radius alone.
     """
-    return Grading(0.7, 1.0, 0.15, 0.0066, 0.168 * layer**0.1)
+    return Grading(0.7, 1.0, 0.145, 0.0066, 0.17 * layer**0.1)
 
 
 class Auto(NodeSet):
@@ -146,12 +146,14 @@ class Auto(NodeSet):
     layers: float | None = Field(
         None, ge=0, description="width of the band before the spacing grows, in layers; absent: spin 5, orbit 1"
     )
-    growth: float | None = Field(None, ge=0, description="growth of the spacing per mm beyond that band; absent: 0.15")
+    growth: float | None = Field(
+        None, ge=0, description="growth of the spacing per mm beyond that band; absent: spin 0.15, orbit 0.145"
+    )
     spacing: float = Field(0.25, gt=0, description="largest spacing [mm]")
     middle: float | None = Field(
         None,
         gt=0,
-        description="largest spacing up to 3 mm from the tool [mm]; absent: spin as spacing, orbit 0.168 n^(1/5)",
+        description="largest spacing up to 3 mm from the tool [mm]; absent: spin as spacing, orbit 0.17 n^(1/5)",
     )
     smallest: float | None = Field(None, gt=0, description="least first spacing [mm]; absent: spin 0.008, orbit 0.0066")
 

@@ -208,7 +208,7 @@ def test_auto_starts_with_a_part_of_the_layer_of_a_power_law(index: float) -> No
     law = PowerLaw(index=index, regularization=1e-6)
     for motion, wanted, smallest, largest in (
         ("spin", 0.75 * 1.5 * index / 2.0, 0.008, 0.25),
-        ("orbit", 0.7 * 1.5 * index**2, 0.0066, 0.168 * min(index, 0.75**0.5) ** 0.2),
+        ("orbit", 0.7 * 1.5 * index**2, 0.0066, 0.17 * min(index, 0.75**0.5) ** 0.2),
     ):
         cloud = StirringTool(motion=motion, nodes=Auto()).cloud(law)
         first = min(max(wanted, smallest), largest)
