@@ -148,6 +148,10 @@ def bearings() -> None:
             )
 
 
+RINGS = {"resolution": 0.45, "layers": 5.0, "growth": 0.15, "smallest": 0.008, "middle": 0.18, "spacing": 0.18}
+"""Auto nodes of the orbit, whatever their defaults."""
+
+
 @dataclass(frozen=True)
 class Comparison:
     """Differences of velocity off the walls, in parts of the tool speed, and the drag [N/mm]."""
@@ -159,7 +163,7 @@ class Comparison:
 
 def orbit_against_reference(index: float) -> Comparison:
     """The steady orbit with λ/μ(100 1/s) = 1e4 on rings graded to the layer at the tool."""
-    nodes = {"kind": "auto", "resolution": 0.45, "spacing": 0.18}
+    nodes = {"kind": "auto", **RINGS}
     scene, start = {"motion": "orbit", "nodes": nodes}, {"values": [1.0, 0.7, 0.5, 0.4]}
     results = steady(scene, index, physics={"penalty": 1e4}, start=start)
     run, fields = results.runs.iloc[0], results.fields

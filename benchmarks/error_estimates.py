@@ -42,7 +42,15 @@ RINGS = [
     {"kind": "rings", "spacing": 0.25, "jitter": 0.2},
     {"kind": "graded-rings", "first": 0.05, "growth": 0.12, "spacing": 0.3},
     {"kind": "scattered", "first": 0.1, "spacing": 0.3},
-    {"kind": "auto", "spacing": 0.25},
+    {
+        "kind": "auto",
+        "resolution": 0.75,
+        "layers": 5.0,
+        "growth": 0.15,
+        "smallest": 0.008,
+        "middle": 0.25,
+        "spacing": 0.25,
+    },
 ]
 LAWS: list[dict[str, Any]] = [
     {"kind": "norton-hoff"},

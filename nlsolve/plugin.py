@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from nlsolve.algebra.system import System
 from nlsolve.contracts.component import Component, InputFile
+from nlsolve.contracts.continuum.adaptive import AdaptiveNodes, Spacing
 from nlsolve.contracts.continuum.cloud import Cloud, Exact, hat_gradients
 from nlsolve.contracts.continuum.discretizer import Discretizer, Operators, PointOperators
 from nlsolve.contracts.continuum.law import ConstitutiveLaw, PowerForm, local_index, stress, tangent_moduli
@@ -27,6 +28,7 @@ from nlsolve.solving.anderson_mixing import Mixing
 from nlsolve.solving.matrices import cached_jacobian
 
 __all__ = [
+    "AdaptiveNodes",
     "AnyDiscretizer",
     "AnyForm",
     "AnyRange",
@@ -74,6 +76,7 @@ __all__ = [
     "SingleSolve",
     "Solve",
     "SolveError",
+    "Spacing",
     "Status",
     "Step",
     "System",

@@ -14,7 +14,8 @@ from nlsolve.contracts.outcome import Outcome
 from nlsolve.contracts.problem import NonlinearProblem
 from nlsolve.contracts.scene import Entry, Simulation, Solve, Workload
 from nlsolve.contracts.status import SolveError, Status
-from nlsolve.flow.accuracy.estimate import error_estimate
+from nlsolve.flow.accuracy.adaptation import Adaptation, carried
+from nlsolve.flow.accuracy.estimate import NOTHING_TO_COMPARE, UNKNOWN, Comparison, compared
 from nlsolve.flow.claims.units import SMALL, WAY_OUT
 from nlsolve.flow.continuation import REST, Solves, Stage, walk
 from nlsolve.flow.incompressibility import iterate_pressure
@@ -31,6 +32,7 @@ class FlowSimulation(Simulation):
     Euler.
 
     A steady flow is its first state; the last stage of the continuation is then solved by the method of the case.
+    Adaptive nodes are made on the way there, and the method of the case solves the flow on the last of their clouds.
     """
 
     prepares = True
@@ -46,6 +48,7 @@ class FlowSimulation(Simulation):
         self.reached = 0.0  # time of the last solved increment
         self.probe: int | None = None
         self.rest: Array | None = None  # velocity at t = 0 of a march that begins at rest
+        self.adaptation = None if parts.scene.adaptive is None else Adaptation(parts.scene.adaptive)
 
     def solves(self) -> Solves:
         """Yields the problems of the first state and of each increment, until one fails. May raise SolveError."""
@@ -78,14 +81,19 @@ class FlowSimulation(Simulation):
     # The parts of a march.
 
     def begin(self) -> None:
-        """Build the cloud at t = 0 and its operators, and find the node of the probe. May raise SolveError."""
-        self.initial = cloud = self.cloud()
+        """Build the cloud at t = 0 and its operators. May raise SolveError."""
+        cloud = self.cloud()
+        self.settle(cloud)
+        self.state.begin(cloud)
+
+    def settle(self, cloud: Cloud) -> None:
+        """Take `cloud` as that of t = 0, and find the node of the probe."""
+        self.initial = cloud
         self.sizes = {
             "nodes": len(cloud.nodes),
             "unknowns": 2 * len(cloud.interior),
             "smallest_spacing": float(cloud.nearest_distance.min()),
         }
-        self.state.begin(cloud)
         probe, inside = self.parts.record.probe, cloud.interior
         if probe is not None:
             self.probe = int(inside[np.linalg.norm(cloud.nodes[inside] - probe, axis=1).argmin()])
@@ -110,11 +118,21 @@ class FlowSimulation(Simulation):
         def solve_stage(stage: Stage, last: bool) -> Solves:
             if not last:
                 return self.prepare(stage)
-            if self.increments:
+            if self.increments or self.adaptation is not None:
                 return iterate_pressure(state, lambda: self.prepare(stage))
             return iterate_pressure(state, lambda: self.increment(0, state.flow_of(stage.law)))
 
         outcome, stage = yield from walk(parts.start, parts.law, solve_stage)
+        while self.adaptation is not None and outcome.status is Status.CONVERGED and self.adapt(self.adaptation):
+            outcome = yield from solve_stage(stage, True)
+            if outcome.status is not Status.CONVERGED:  # the state of the last cloud is no start for this one
+                state.velocity = state.guess = np.zeros_like(state.cloud.nodes)
+                outcome, stage = yield from walk(parts.start, parts.law, solve_stage)
+        if self.adaptation is not None and outcome.status is Status.CONVERGED:
+            outcome = yield from iterate_pressure(state, lambda: self.increment(0, state.flow_of(parts.law)))
+            if outcome.status is Status.CONVERGED and not self.adaptation.reached:
+                detail = self.adaptation.shortfall(len(state.cloud.nodes))
+                outcome = replace(outcome, status=Status.BUDGET_SPENT, detail=detail)
         if outcome.status is Status.CONVERGED:
             assert state.flow is not None
             self.record_beginning(state.flow)
@@ -122,6 +140,32 @@ class FlowSimulation(Simulation):
             detail = f"on the way to the first state, at {parts.start.by} = {stage.value:g}: {outcome.detail}"
             return replace(outcome, detail=detail)
         return outcome
+
+    def adapt(self, adaptation: Adaptation) -> bool:
+        """Estimate the error of the state, and carry it to a cloud for the error asked for; False where that is reached
+        already, or the limits allow no larger cloud. May raise SolveError.
+        """
+        state = self.state
+        refused: SolveError | None = None
+        with state.entry("estimate"):
+            try:
+                found = compared(state, state.velocity, None)
+            except SolveError as refusal:  # a better cloud may be one on which the flow can be solved
+                refused, found = refusal, UNKNOWN
+        adaptation.judge(found)
+        count = None if adaptation.reached else adaptation.next_count(len(state.cloud.nodes))
+        if count is None:
+            if refused is not None:
+                raise refused
+            return False
+        here = state.cloud
+        with state.entry("operators"):
+            cloud = adaptation.cloud(self.parts.scene, here, state.velocity, count)
+            carry = carried(here, cloud)
+        adaptation.rounds += 1
+        state.carry_to(cloud, carry)
+        self.settle(cloud)
+        return True
 
     def first_increment_from_rest(self) -> Solves:
         """V(t = 0) = 0 inside, and what is prescribed on the boundary; the method of the case solves increment 1.
@@ -148,9 +192,14 @@ class FlowSimulation(Simulation):
         self.record_fields_if_due(flow)
 
     def prepare(self, stage: Stage) -> Solves:
-        """Yields the problem of one stage on the way to the first state."""
+        """Yields the problem of one stage on the way to the first state. On a cloud made from a solution it may take
+        all iterations of the budget: to go all the way again costs more.
+        """
         flow = self.state.flow_of(stage.law, load=stage.load)
-        preparation = self.parts.start.preparation(self.parts.budget.iterations)
+        most = self.parts.budget.iterations
+        preparation = self.parts.start.preparation(most)
+        if self.adaptation is not None and self.adaptation.rounds:
+            preparation = replace(preparation, iterations=most)
         return (yield Solve(flow, flow.unknowns(self.state.guess), preparation=preparation))
 
     def advance(self, k: int) -> Solves:
@@ -212,9 +261,17 @@ class FlowSimulation(Simulation):
         found |= velocity_error(parts.scene, flow, velocity, time)
         found |= wall_reaction(parts.scene, parts.motion, parts.discretizer, flow, velocity, time)
 
-        def estimate() -> float:
+        if self.adaptation is not None:
+            found |= {
+                "cloud_rounds": self.adaptation.rounds,
+                "estimate_factorizations": self.adaptation.factorizations,
+            }
+
+        def estimate() -> Comparison:
+            if self.adaptation is not None and self.adaptation.found is not None:
+                return self.adaptation.found
             solved = outcome.status is Status.CONVERGED
-            return error_estimate(state, velocity, self.before) if solved else float("nan")
+            return compared(state, velocity, self.before) if solved else NOTHING_TO_COMPARE
 
         error = found.get("velocity_error_inside", float("nan"))
         return found | audit(parts, flow, velocity, change, time, estimate, error)

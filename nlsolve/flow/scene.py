@@ -7,8 +7,9 @@ from collections.abc import Collection, Mapping
 from typing import Any, ClassVar
 
 import numpy as np
-from pydantic import ValidationError
+from pydantic import ValidationError, model_validator
 
+from nlsolve.contracts.continuum.adaptive import AdaptiveNodes
 from nlsolve.contracts.continuum.discretizer import Discretizer
 from nlsolve.contracts.continuum.geometry import Geometry
 from nlsolve.contracts.continuum.law import ConstitutiveLaw
@@ -18,6 +19,9 @@ from nlsolve.contracts.scene import Entry, Misfit, Scene, Section
 from nlsolve.flow.continuation import LOAD, REST, Start
 from nlsolve.flow.march import FlowSimulation
 from nlsolve.flow.state import FlowParts
+
+WAY = ("scene", "law", "physics", "motion", "discretizer", "linear", "start")
+"""The sections on which the way to a first state depends."""
 
 
 class FlowScene(Geometry, Scene, ABC):
@@ -35,14 +39,25 @@ class FlowScene(Geometry, Scene, ABC):
         "record": Section(Recording),
     }
 
+    @model_validator(mode="before")
+    @classmethod
+    def _adaptive_where_nodes_can_be(cls, given: Any) -> Any:
+        asked = given.get("nodes") if isinstance(given, Mapping) else None
+        kind = asked.get("kind") if isinstance(asked, Mapping) else getattr(asked, "kind", asked)
+        if kind == AdaptiveNodes.model_fields["kind"].default and cls.graded is Geometry.graded:
+            raise ValueError(f"nodes: the scene {cls.kind_name()} has no adaptive clouds: choose its spacing")
+        return given
+
     def simulation(self, parts: FlowParts, entry: Entry) -> FlowSimulation:
         """The flow of a case; `entry` times the building of its operators."""
         return FlowSimulation(parts, entry)
 
     def way(self, parts: FlowParts) -> Collection[str]:
         """All sections but those of the method, of increments, and of what is recorded."""
+        if self.adaptive is not None:
+            return (*WAY, "error_estimator")
         leads = parts.start.at != REST and (parts.time.increments or parts.start.values)
-        return ("scene", "law", "physics", "motion", "discretizer", "linear", "start") if leads else ()
+        return WAY if leads else ()
 
     def check(self, parts: Any) -> None:
         """Raises Misfit when nodes move that must stay, when moving nodes are combined with convection, or when the law
@@ -55,6 +70,10 @@ class FlowScene(Geometry, Scene, ABC):
                 "physics",
                 "convection",
                 'nodes that move with the material carry it already; use motion.nodes = "fixed"',
+            )
+        if self.adaptive is not None and parts.time.increments:
+            raise Misfit(
+                "time", "horizon", "adaptive nodes follow one steady state: leave it out, or choose other nodes"
             )
         if parts.start.at == REST:
             self._check_rest(parts)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from copy import copy
 from typing import Any, Protocol
 
@@ -85,6 +86,15 @@ class FlowState:
             )
         self.build_operators()
         self.velocity = self.guess = np.zeros_like(cloud.nodes)
+
+    def carry_to(self, cloud: Cloud, carry: Callable[[Array], Array]) -> None:
+        """Go on with other nodes at the same time; velocity and pressure are carried there. May raise SolveError.
+
+        carry : values at the present nodes (N, 2) -> values at those of `cloud`.
+        """
+        self.velocity = self.guess = carry(self.velocity)
+        self.cloud = cloud
+        self.build_operators()
 
     def move_to(self, time: float, before: Array | None) -> Any:
         """Go on to `time` [s]: moving nodes get new places and operators, and velocities are carried to shifted nodes.

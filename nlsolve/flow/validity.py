@@ -20,6 +20,7 @@ import scipy
 
 from nlsolve.contracts.continuum.law import CONTRACTION, rate_squared, stress
 from nlsolve.contracts.status import SolveError
+from nlsolve.flow.accuracy.estimate import NOTHING_TO_COMPARE, Comparison
 from nlsolve.flow.accuracy.holes import largest_hole
 from nlsolve.flow.claims.exact import disagreement
 from nlsolve.flow.claims.finding import Finding
@@ -116,14 +117,14 @@ def audit(
     velocity: Array,
     change: Array | None,
     time: float,
-    estimate: Callable[[], float] = lambda: float("nan"),
+    estimate: Callable[[], Comparison] = lambda: NOTHING_TO_COMPARE,
     error: float = float("nan"),
 ) -> dict[str, Any]:
-    """The columns `audit.…`, `velocity_error_estimate` and `doubt` of a solved flow with `velocity` (N, 2).
+    """The columns `audit.…`, `…_error_estimate` and `doubt` of a solved flow with `velocity` (N, 2).
 
     change : ∂V/∂t (N, 2) [mm/s²] over the last increment, dV/dt for moving nodes; None for a steady scene.
     time : time that the march has reached [s]; 0 for a steady scene.
-    estimate : returns the relative error of the velocity inside, estimated by other solutions; NaN without one.
+    estimate : returns the velocity beside a better one, by other solutions; NaN without one.
     error : of the velocity inside, against the exact solution; NaN without one.
     When an operator cannot be built, the `doubt` has the reason, and only the claims of law and numbers are audited.
     """
@@ -140,7 +141,7 @@ def audit(
     except SolveError as refusal:
         found = {name: claim.value for name, claim in claims.items()}
         return found | {"doubt": _doubt(found, claims, f"the audits could not be made: {refusal.detail}")}
-    estimated, doubts = float("nan"), []
+    estimated, doubts = NOTHING_TO_COMPARE, []
     try:
         estimated = estimate()
     except SolveError as refusal:
@@ -154,13 +155,14 @@ def audit(
         "audit.residual": _residual(flow, velocity),
         "audit.balance": _balance(parts, flow, velocity, change, slopes, stress_slopes),
         "audit.resolution": _resolution(flow, velocity, slopes),
-        "velocity_error_estimate": estimated,
+        "velocity_error_estimate": estimated.relative,
+        "worst_error_estimate": estimated.worst,
         **{name: claim.value for name, claim in claims.items()},
         "audit.exact": float("nan"),
         "audit.heating": _heating(parts, flow, strain_rate, time),
     }
     if not _doubt(found, claims, *doubts):  # an error that another audit explains does not belie the exact solution
-        claims["audit.exact"] = disagreement(parts.scene.called(), error, estimated)
+        claims["audit.exact"] = disagreement(parts.scene.called(), error, estimated.relative)
         found["audit.exact"] = claims["audit.exact"].value
     return found | {"doubt": _doubt(found, claims, *doubts)}
 

@@ -65,6 +65,8 @@ RUNS = _by_name(
     Column("blame_unknown", "of a failed solve of a system: the unknown whose equation is farthest from solved"),
     Column("nodes", "N, nodes of the cloud"),
     Column("unknowns", "U, unknown velocity components, or unknowns of a system"),
+    Column("cloud_rounds", "adaptive nodes: clouds made from a solution, after the first"),
+    Column("estimate_factorizations", "adaptive nodes: matrices factorised to estimate the error of each cloud"),
     Column("smallest_spacing", "smallest distance between two nodes at t = 0", "mm"),
     Column("form", "form of the operators that a flow was solved with: strong or conservative"),
     Column(
@@ -152,7 +154,13 @@ RUNS = _by_name(
     ),
     Column("seconds_operators", "building operators, the same for every method and not in `seconds`", "s", timed=True),
     Column("seconds_start", "reaching the first state", "s", timed=True),
-    Column("seconds_all", "operators, first state and march: what the result costs in all", "s", timed=True),
+    Column("seconds_estimate", "adaptive nodes: estimating the error of each cloud", "s", timed=True),
+    Column(
+        "seconds_all",
+        "operators, first state, march and the estimates of adaptive nodes: what the result costs in all",
+        "s",
+        timed=True,
+    ),
     Column("ordering", "column ordering the linear solver used"),
     Column("fill", "entries stored in the last factors", symbol="entries of the factors"),
     Column(
@@ -203,6 +211,11 @@ RUNS = _by_name(
         "velocity_error_estimate",
         "estimate of velocity_error_inside, with or without an exact solution: how far the velocities are from those "
         "of a solution on an enriched cloud, with a lower dilatation",
+        relative_error=True,
+    ),
+    Column(
+        "worst_error_estimate",
+        "the same for the worst node inside: its error over the largest speed",
         relative_error=True,
     ),
     Column(

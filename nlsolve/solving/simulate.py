@@ -30,7 +30,7 @@ from nlsolve.solving.tangent import Tangent
 from nlsolve.solving.way import Walk, Way
 from nlsolve.solving.work.ledger import Ledger
 
-LOADED_WHEN_ASKED_FOR = ("optimize", "spatial", "special")
+LOADED_WHEN_ASKED_FOR = ("interpolate", "optimize", "spatial", "special")
 """Packages of scipy that cases use, which scipy imports when they are first asked for."""
 
 
@@ -279,7 +279,8 @@ class _Run:
             **reported(self.rows),
             **(preparation if self.simulation.prepares else {}),
             "seconds_operators": ledger.seconds["operators"],
-            "seconds_all": ledger.seconds["method"] + ledger.seconds["operators"] + start.seconds["stage"],
+            **({"seconds_estimate": ledger.seconds["estimate"]} if ledger.counts["estimate"] else {}),
+            "seconds_all": start.seconds["stage"] + sum(ledger.seconds[k] for k in ("method", "operators", "estimate")),
             **self.tangent.facts(),
             "residual_norm": self.residual_norm,
             "residual_absolute": self.residual_absolute,

@@ -2,13 +2,26 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any, ClassVar, Literal
 
 import numpy as np
 from pydantic import Field
 
-from nlsolve.plugin import Cloud, ConstitutiveLaw, Exact, FlowScene, Misfit, Physics, SolveError, Status
+from nlsolve.plugin import (
+    AdaptiveNodes,
+    Cloud,
+    ConstitutiveLaw,
+    Exact,
+    FlowScene,
+    Misfit,
+    Physics,
+    SolveError,
+    Spacing,
+    Status,
+)
 from nlsolve_scenes.nodes.files import NodeFile
+from nlsolve_scenes.nodes.rectangle import sides
 from nlsolve_scenes.nodes.scatter import jittered, scatter
 
 NO_POWER_LAW = (
@@ -28,8 +41,8 @@ class Channel(FlowScene):
     length: float = Field(2.0, gt=0, description="L [mm]")
     mean_speed: float = Field(100.0, gt=0, description="mean velocity of the pure power law, which sets G [mm/s]")
     spacing: float = Field(0.1, gt=0, description="distance of nodes [mm]")
-    nodes: Literal["grid", "scattered"] | NodeFile = Field(
-        "grid", description="a regular grid, scattered nodes, or those of a file"
+    nodes: Literal["grid", "scattered"] | AdaptiveNodes | NodeFile = Field(
+        "grid", description="a regular grid, scattered nodes, nodes that follow the solution, or those of a file"
     )
     jitter: float = Field(
         0.0, ge=0, lt=0.5, description="random shift of interior nodes, as a fraction of the distance to the nearest"
@@ -54,8 +67,20 @@ class Channel(FlowScene):
         if isinstance(self.nodes, NodeFile):
             cloud = self.nodes.cloud(("bottom", "top", "inlet", "outlet"))
         else:
-            cloud = self._grid() if self.nodes == "grid" else self._scattered(self._grid())
+            cloud = self._scattered(self._grid()) if self.nodes == "scattered" else self._grid()
         return jittered(cloud, self.jitter, self.seed)
+
+    @property
+    def adaptive(self) -> AdaptiveNodes | None:
+        """The node set, where it follows the solution; it begins on the regular grid."""
+        return self.nodes if isinstance(self.nodes, AdaptiveNodes) else None
+
+    def graded(self, spacing: Spacing, nodes: AdaptiveNodes) -> Cloud:
+        """Nodes at equal steps of ∫ ds/h on the four sides, and scattered nodes between them."""
+        low, high = (0.0, -self.half_height), (self.length, self.half_height)
+        walls = sides(low, high, spacing)
+        ends = {"inlet": walls.pop("left"), "outlet": walls.pop("right")}
+        return jittered(self._filled(walls | ends, spacing, nodes.seed), self.jitter, self.seed)
 
     def boundary_position(self, cloud: Cloud, time: float) -> np.ndarray:
         """The walls and both ends stay where they are, at any time."""
@@ -91,13 +116,11 @@ class Channel(FlowScene):
     def _scattered(self, grid: Cloud) -> Cloud:
         """The boundary nodes of the grid, and scattered nodes between them."""
         walls = {name: grid.nodes[group] for name, group in grid.boundaries.items()}
+        return self._filled(walls, lambda points: np.full(len(points), self.spacing), self.seed)
+
+    def _filled(self, walls: Mapping[str, np.ndarray], spacing: Spacing, seed: int) -> Cloud:
         middle, reach = np.array([0.5 * self.length, 0.0]), np.array([0.5 * self.length, self.half_height])
-        return scatter(
-            walls,
-            lambda points: (np.abs(points - middle) < reach).all(axis=1),
-            lambda points: np.full(len(points), self.spacing),
-            self.seed,
-        )
+        return scatter(walls, lambda points: (np.abs(points - middle) < reach).all(axis=1), spacing, seed)
 
     def _profile(self, law: ConstitutiveLaw, points: np.ndarray) -> tuple[np.ndarray, float]:
         """Exact velocity (N, 2) and G. Raises SolveError (not applicable) for a law that is no power law."""

@@ -7,13 +7,29 @@ from typing import Annotated, ClassVar, Literal, Self
 import numpy as np
 from pydantic import Field, model_validator
 
-from nlsolve.plugin import Cloud, ConstitutiveLaw, Exact, FlowScene, NodeMotion, SolveError, Status, local_index
+from nlsolve.plugin import (
+    AdaptiveNodes,
+    Cloud,
+    ConstitutiveLaw,
+    Exact,
+    FlowScene,
+    NodeMotion,
+    SolveError,
+    Spacing,
+    Status,
+    local_index,
+)
 from nlsolve_scenes.nodes.files import NodeFile
-from nlsolve_scenes.nodes.rings import Auto, GradedRings, Rings, Scattered
+from nlsolve_scenes.nodes.fronts import annulus
+from nlsolve_scenes.nodes.rings import SPIN, Auto, GradedRings, Rings, Scattered, orbit
 
-Nodes = Annotated[Rings | GradedRings | Scattered | Auto | NodeFile, Field(discriminator="kind")]
+Nodes = Annotated[Rings | GradedRings | Scattered | Auto | AdaptiveNodes | NodeFile, Field(discriminator="kind")]
 ON_CIRCLE = 1e-3  # largest distance of a wall node read from a file from its circle, in radii
 THINNEST = 1e-3  # least local index of the law that a layer is computed with: a perfectly plastic law has n = 0
+
+
+BEFORE = {"resolution": 2.0, "layers": 1.0, "growth": 0.4}
+"""The auto nodes on which adaptive ones begin: few, but some in every layer."""
 
 
 class StirringTool(FlowScene):
@@ -35,7 +51,9 @@ class StirringTool(FlowScene):
     tool_radius: float = Field(1.5, gt=0, description="r_t [mm]")
     plate_radius: float = Field(6.0, gt=0, description="r_p [mm]")
     angular_speed: float = Field(100.0, gt=0, description="ω [rad/s]")
-    nodes: Nodes = Field(default_factory=Rings, description="node set: rings, graded-rings, scattered, auto or file")
+    nodes: Nodes = Field(
+        default_factory=Rings, description="node set: rings, graded-rings, scattered, auto, adaptive or file"
+    )
 
     @model_validator(mode="after")
     def _radii_in_order(self) -> Self:
@@ -71,7 +89,12 @@ class StirringTool(FlowScene):
         Raises SolveError (bad cloud) when a wall node read from a file is off its circle.
         """
         if not isinstance(self.nodes, NodeFile):
-            nodes = self.nodes.rings(self.layer(law)) if isinstance(self.nodes, Auto) else self.nodes
+            nodes = self.nodes
+            if isinstance(nodes, AdaptiveNodes):
+                nodes = Auto(spacing=nodes.spacing, middle=nodes.spacing, **BEFORE)
+            if isinstance(nodes, Auto):
+                layer = self.layer(law)
+                nodes = nodes.rings(layer, SPIN if self.motion == "spin" else orbit(layer / self.tool_radius))
             return nodes.cloud(self.tool_radius, self.plate_radius)
         cloud = self.nodes.cloud(("tool", "plate"))
         for group, radius in (("tool", self.tool_radius), ("plate", self.plate_radius)):
@@ -84,6 +107,15 @@ class StirringTool(FlowScene):
                     f"{group}_radius = {radius:g} mm: change one of them",
                 )
         return cloud
+
+    @property
+    def adaptive(self) -> AdaptiveNodes | None:
+        """The node set, where it follows the solution."""
+        return self.nodes if isinstance(self.nodes, AdaptiveNodes) else None
+
+    def graded(self, spacing: Spacing, nodes: AdaptiveNodes) -> Cloud:
+        """Fronts around the tool, then scattered nodes; boundary groups "tool" and "plate"."""
+        return annulus(self.tool_radius, self.plate_radius, spacing, nodes.seed)
 
     def boundary_position(self, cloud: Cloud, time: float) -> np.ndarray:
         """The tool's nodes turned by ωt, or shifted by r_t (−sin ωt, 1 − cos ωt); the plate's nodes stay."""

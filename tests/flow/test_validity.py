@@ -54,7 +54,11 @@ def linear(*rows: tuple[float, float]) -> Any:
 def test_every_limit_and_every_finding_is_a_column() -> None:
     found = audit_of(linear((0, 1), (0, 0)))
     assert set(LIMITS) < set(found) <= set(RUNS)
-    assert set(found) == {name for name in RUNS if name.startswith("audit.")} | {"velocity_error_estimate", "doubt"}
+    assert set(found) == {name for name in RUNS if name.startswith("audit.")} | {
+        "velocity_error_estimate",
+        "worst_error_estimate",
+        "doubt",
+    }
 
 
 # Accelerations: the Newtonian spin u_θ = A r + B/r has τ = −2μB/r², ‖∇S‖ = 4 |τ|/r and ρ (V·∇) V = −ρ u_θ²/r e_r.

@@ -6,6 +6,7 @@ from abc import ABC, abstractmethod
 from typing import ClassVar
 
 from nlsolve.contracts.component import Component
+from nlsolve.contracts.continuum.adaptive import AdaptiveNodes, Spacing
 from nlsolve.contracts.continuum.cloud import Cloud, Exact
 from nlsolve.contracts.continuum.law import ConstitutiveLaw
 from nlsolve.contracts.continuum.terms import NodeMotion, Physics
@@ -38,6 +39,18 @@ class Geometry(Component, ABC):
     @abstractmethod
     def boundary_velocity(self, cloud: Cloud, law: ConstitutiveLaw, time: float) -> Array:
         """V on the boundary nodes of the (current) `cloud`, shape (len(cloud.boundary), 2) [mm/s]."""
+
+    @property
+    def adaptive(self) -> AdaptiveNodes | None:
+        """What nodes that follow the solution are to reach; None for nodes that are known before it."""
+        return None
+
+    def graded(self, spacing: Spacing, nodes: AdaptiveNodes) -> Cloud:
+        """Nodes at distances of about h(x) in the material and on its boundary, for a scene whose nodes are `adaptive`.
+
+        May raise SolveError (bad cloud).
+        """
+        raise NotImplementedError(f"{type(self).__name__} has no nodes by a given spacing")
 
     def body_force(self, points: Array, law: ConstitutiveLaw, physics: Physics) -> Array | None:
         """f at `points` (N, 2), shape (N, 2) [N/mm³]; None when no body force acts."""

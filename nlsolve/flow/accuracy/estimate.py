@@ -10,16 +10,19 @@ compressibility is a small part of what it was: V* − V has the error of the pe
 Fortin & Glowinski 1983).
 
 Newton's steps, all with the factors of the first tangent (`kept_factors`), end when one is small beside the way gone.
-Nothing of this is counted or timed.
+None of this is counted with the work of the method.
 """
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from itertools import islice
+from typing import Any
 
 import numpy as np
 
 from nlsolve.contracts.continuum.discretizer import Discretizer
+from nlsolve.contracts.linear_solver import Factors, LinearSolver
 from nlsolve.contracts.status import SolveError, Status
 from nlsolve.flow.accuracy.enrichment import Enriched, enriched, twice_as_fine
 from nlsolve.flow.accuracy.kept_factors import KeptFactors
@@ -43,35 +46,81 @@ RICHARDSON = 1.0 / 3.0
 """1/(2² − 1): what is left of an error of second order at half the distance, over what has gone."""
 
 
-def error_estimate(state: FlowState, velocity: Array, before: Array | None) -> float:
-    """The estimate for the `velocity` (N, 2) [mm/s] at the end of an increment that began with `before` (N, 2); NaN
-    where the case has no estimator.
+@dataclass(frozen=True)
+class Comparison:
+    """A velocity V (N, 2) beside the better one V* at the same nodes.
+
+    relative : ‖V* − V‖₂/‖V‖₂ over the interior nodes.
+    worst : the largest |V* − V| there over the largest |V| of all nodes.
+    factorizations : matrices factorised for it.
+    """
+
+    relative: float
+    worst: float
+    factorizations: int = 0
+
+    @property
+    def larger(self) -> float:
+        """The larger of both errors."""
+        return max(self.relative, self.worst)
+
+
+NOTHING_TO_COMPARE = Comparison(float("nan"), float("nan"))
+UNKNOWN = Comparison(float("inf"), float("inf"))
+"""Of a flow that could not be solved with more nodes."""
+
+
+def compared(state: FlowState, velocity: Array, before: Array | None) -> Comparison:
+    """The `velocity` (N, 2) [mm/s] at the end of an increment that began with `before` (N, 2), beside the better one;
+    NaN where the case has no estimator.
 
     Raises SolveError where the flow cannot be solved so.
     """
-    estimator, inside = state.parts.error_estimator, state.cloud.interior
+    estimator, inside, work = state.parts.error_estimator, state.cloud.interior, Ledger()
     if estimator is None:
-        return float("nan")
+        return NOTHING_TO_COMPARE
     nothing = np.empty((0, 2), dtype=int)
-    fine = _solution(state, twice_as_fine(state.cloud), estimator, velocity, before)
-    coarse = _solution(state, enriched(state.cloud, nothing), estimator, velocity, before)
+    fine = _solution(state, twice_as_fine(state.cloud), estimator, velocity, before, work)
+    coarse = _solution(state, enriched(state.cloud, nothing), estimator, velocity, before, work)
     best = fine[: len(velocity)] + RICHARDSON * (fine[: len(velocity)] - coarse)
-    return float(np.linalg.norm((best - velocity)[inside]) / np.linalg.norm(velocity[inside]))
+    error = (best - velocity)[inside]
+    return Comparison(
+        float(np.linalg.norm(error) / np.linalg.norm(velocity[inside])),
+        float(np.linalg.norm(error, axis=1).max() / np.linalg.norm(velocity, axis=1).max()),
+        work.counts["factorization"],
+    )
+
+
+@dataclass(frozen=True)
+class _Counted:
+    """A linear solver whose factorisations are entered in `work`."""
+
+    linear: LinearSolver
+    work: Ledger
+
+    def factorize(self, matrix: Any, previous: Factors | None = None) -> Factors:
+        with self.work.entry("factorization"):
+            return self.linear.factorize(matrix, previous)
 
 
 def _solution(
-    state: FlowState, finer: Enriched, discretizer: Discretizer, velocity: Array, before: Array | None
+    state: FlowState,
+    finer: Enriched,
+    discretizer: Discretizer,
+    velocity: Array,
+    before: Array | None,
+    work: Ledger,
 ) -> Array:
     """V on an enriched cloud, whose nodes begin with those of `state`. Raises SolveError."""
     there = state.enriched(finer, discretizer, velocity)
     inertia = there.inertia_from(None if before is None else finer.carry(before))
     flow = there.flow_of(state.parts.law, inertia)
-    return flow.velocity(_solved(flow, flow.unknowns(there.velocity), state))
+    return flow.velocity(_solved(flow, flow.unknowns(there.velocity), state, work))
 
 
-def _solved(flow: Flow, start: Array, state: FlowState) -> Array:
+def _solved(flow: Flow, start: Array, state: FlowState, work: Ledger) -> Array:
     """R(u) = 0 from `start` (U,), to the accuracy that an estimate needs. Raises SolveError."""
-    linear = KeptFactors(linear=state.parts.linear.for_one_matrix())
+    linear = KeptFactors(linear=_Counted(state.parts.linear.for_one_matrix(), work))
     problem, tangent = CountedProblem(flow, Ledger()), Tangent(linear, None, Ledger())
     last, forces = start, np.linalg.norm(flow.residual(start))
     if forces <= SOLVED * flow.scale(start):

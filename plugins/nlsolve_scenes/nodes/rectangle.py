@@ -9,7 +9,7 @@ from typing import ClassVar, Literal
 import numpy as np
 from pydantic import Field
 
-from nlsolve.plugin import Cloud, ConstitutiveLaw, FlowScene
+from nlsolve.plugin import Cloud, ConstitutiveLaw, FlowScene, Spacing
 from nlsolve_scenes.nodes.grading import lines, relative_spacing
 from nlsolve_scenes.nodes.scatter import jittered, scatter
 
@@ -85,3 +85,28 @@ def grid(x: np.ndarray, y: np.ndarray) -> Cloud:
     nodes = np.stack([coordinate.ravel() for coordinate in np.meshgrid(x, y)], axis=1)
     number = np.arange(len(nodes)).reshape(len(y), len(x))
     return Cloud(nodes, {"bottom": number[0], "top": number[-1], "left": number[1:-1, 0], "right": number[1:-1, -1]})
+
+
+def sides(low: tuple[float, float], high: tuple[float, float], spacing: Spacing) -> dict[str, np.ndarray]:
+    """Nodes at equal steps of ∫ ds/h on the sides of the rectangle between two corners: "bottom" and "top" with the
+    corners, "left" and "right" without.
+    """
+    (x, y), (x_end, y_end) = low, high
+    return {
+        "bottom": _between((x, y), (x_end, y), spacing),
+        "top": _between((x, y_end), (x_end, y_end), spacing),
+        "left": _between((x, y), (x, y_end), spacing)[1:-1],
+        "right": _between((x_end, y), (x_end, y_end), spacing)[1:-1],
+    }
+
+
+def _between(start: tuple[float, float], end: tuple[float, float], spacing: Spacing) -> np.ndarray:
+    """Nodes from one point to another, both among them."""
+    part = np.linspace(0.0, 1.0, 2001)[:, None]
+    line = (1.0 - part) * np.array(start) + part * np.array(end)
+    slowness = 1.0 / spacing(line)
+    steps = np.concatenate([[0.0], np.cumsum(0.5 * (slowness[1:] + slowness[:-1]))])
+    steps *= float(np.hypot(*np.subtract(end, start))) / (len(line) - 1)
+    count = max(2, round(steps[-1]))
+    at = np.interp(np.arange(count + 1) / count * steps[-1], steps, part[:, 0])[:, None]
+    return (1.0 - at) * np.array(start) + at * np.array(end)

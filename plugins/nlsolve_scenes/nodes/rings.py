@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -48,16 +49,26 @@ class Rings(AnnulusSet):
 
 
 class GradedSet(AnnulusSet):
-    """h(r) = min(first + growth max(0, |r − r_t| − even), spacing): spacing that grows away from the tool."""
+    """h(r) = min(first + growth max(0, d − even), middle + growth max(0, d − reach), spacing), d = |r − r_t|: spacing
+    that grows away from the tool.
+    """
 
     first: float = Field(0.1, gt=0, description="spacing at the tool [mm]")
     even: float = Field(0.0, ge=0, description="width of the band at the tool before the spacing grows [mm]")
     growth: float = Field(0.12, ge=0, description="growth of the spacing per mm of distance beyond that band")
+    middle: float | None = Field(
+        None, gt=0, description="largest spacing within the reach of the tool [mm]; absent: as `spacing`"
+    )
+    reach: float = Field(3.0, ge=0, description="distance from the tool up to which `middle` holds [mm]")
     spacing: float = Field(0.25, gt=0, description="largest spacing [mm]")
 
     def local_spacing(self, radii: np.ndarray, inner: float) -> np.ndarray:
         """h(r) [mm]."""
-        return np.minimum(self.first + self.growth * np.maximum(0.0, np.abs(radii - inner) - self.even), self.spacing)
+        distance = np.abs(radii - inner)
+        h = np.minimum(self.first + self.growth * np.maximum(0.0, distance - self.even), self.spacing)
+        if self.middle is None:
+            return h
+        return np.minimum(h, self.middle + self.growth * np.maximum(0.0, distance - self.reach))
 
 
 class GradedRings(GradedSet):
@@ -96,28 +107,66 @@ class Scattered(GradedSet):
         return scatter(walls, inside, spacing, self.seed)
 
 
+@dataclass(frozen=True)
+class Grading:
+    """The fields of `Auto` for one motion of the tool, where a study leaves them out."""
+
+    resolution: float
+    layers: float
+    growth: float
+    smallest: float
+    middle: float | None
+
+
+SPIN = Grading(0.75, 5.0, 0.15, 0.008, None)
+"""One layer, all around the tool, and nothing beyond it."""
+
+
+def orbit(layer: float) -> Grading:
+    """For a layer of so many tool radii: a thinner one, and lines beyond it on which the strain rate falls steeply, at
+    a spacing of 0.17 n^(1/5) mm for the index n = √layer. The lines turn with the tool's velocity, so that the
+    spacing depends on the radius alone.
+    """
+    return Grading(0.7, 1.0, 0.145, 0.0066, 0.17 * layer**0.1)
+
+
 class Auto(NodeSet):
     """Graded rings with first = resolution · layer and even = layers · layer: the flow's layer at the tool decides.
 
     The layer is the distance over which the strain rate at the tool falls by e; it follows from the law and the motion
     (see the scene). Evenly spaced nodes across a few layers reduce the error more than finer ones at the tool.
     `smallest` limits the number of nodes where the layer is very thin: in the spin for n < 0.015, in the orbit for
-    n < 0.085. The column `smallest_spacing` of the runs holds the first spacing chosen.
+    n < 0.08. The column `smallest_spacing` of the runs holds the first spacing chosen.
     """
 
     kind: Literal["auto"] = "auto"
-    resolution: float = Field(0.75, gt=0, description="first spacing in layers: the smaller, the finer")
-    layers: float = Field(5.0, ge=0, description="width of the band before the spacing grows, in layers")
-    growth: float = Field(0.15, ge=0, description="growth of the spacing per mm of distance beyond that band")
+    resolution: float | None = Field(
+        None, gt=0, description="first spacing in layers: the smaller, the finer; absent: spin 0.75, orbit 0.7"
+    )
+    layers: float | None = Field(
+        None, ge=0, description="width of the band before the spacing grows, in layers; absent: spin 5, orbit 1"
+    )
+    growth: float | None = Field(
+        None, ge=0, description="growth of the spacing per mm beyond that band; absent: spin 0.15, orbit 0.145"
+    )
     spacing: float = Field(0.25, gt=0, description="largest spacing [mm]")
-    smallest: float = Field(0.008, gt=0, description="least first spacing [mm]")
+    middle: float | None = Field(
+        None,
+        gt=0,
+        description="largest spacing up to 3 mm from the tool [mm]; absent: spin as spacing, orbit 0.17 n^(1/5)",
+    )
+    smallest: float | None = Field(None, gt=0, description="least first spacing [mm]; absent: spin 0.008, orbit 0.0066")
 
-    def rings(self, layer: float) -> GradedRings:
-        """The graded rings for a layer [mm]."""
+    def rings(self, layer: float, motion: Grading) -> GradedRings:
+        """The graded rings for a layer [mm], with what is left out as the `motion` has it."""
+        asked = self.model_dump(include=set(Grading.__dataclass_fields__), exclude_none=True)
+        grading = replace(motion, **asked)
         return GradedRings(
-            first=min(max(self.resolution * layer, self.smallest), self.spacing),
-            even=self.layers * layer,
-            **self.model_dump(include={"growth", "spacing", "jitter", "seed"}),
+            first=min(max(grading.resolution * layer, grading.smallest), self.spacing),
+            even=grading.layers * layer,
+            growth=grading.growth,
+            middle=grading.middle,
+            **self.model_dump(include={"spacing", "jitter", "seed"}),
         )
 
 

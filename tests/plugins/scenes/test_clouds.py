@@ -13,8 +13,9 @@ from cases import setup
 from nlsolve_laws import Bingham, CarreauYasuda, HerschelBulkley, NortonHoff, PowerLaw
 from nlsolve_linear.superlu import SuperLU
 from nlsolve_scenes import Channel, Couette, StirringTool
-from nlsolve_scenes.nodes import files
+from nlsolve_scenes.nodes import files, fronts
 from nlsolve_scenes.nodes.files import NodeFile
+from nlsolve_scenes.nodes.rectangle import sides
 from nlsolve_scenes.nodes.rings import Auto, GradedRings, Rings, Scattered
 from nlsolve_scenes.nodes.scatter import jittered, scatter
 from pydantic import ValidationError
@@ -158,18 +159,72 @@ def test_graded_rings_reach_a_hundred_radii() -> None:
     assert (np.diff(radii)[1:] / np.diff(radii)[:-1]).max() < 1.13
 
 
+# Fronts and sides by a given spacing.
+
+
+def towards_the_side(points: Array) -> Array:
+    """Finest at the side of the tool, (0, 1.5)."""
+    return 0.03 + 0.15 * np.hypot(points[:, 0], points[:, 1] - 1.5)
+
+
+def test_fronts_around_the_tool_keep_to_the_spacing() -> None:
+    cloud = fronts.annulus(1.5, 6.0, towards_the_side, 0)
+    h = towards_the_side(cloud.nodes)
+    ratio = cloud.nearest_distance / h
+    assert ratio.min() > 0.5
+    assert ratio.max() < 1.2
+    assert np.median(ratio) == pytest.approx(0.95, abs=0.1)
+    centres = cloud.nodes[Delaunay(cloud.nodes).simplices]
+    middle = centres.mean(axis=1)
+    inside = np.hypot(*middle.T) > 1.5
+    longest = np.linalg.norm(centres - np.roll(centres, 1, axis=1), axis=2).max(axis=1)
+    assert (longest / towards_the_side(middle))[inside & (np.hypot(*middle.T) < 5.9)].max() < 2.5
+    for group, radius in (("tool", 1.5), ("plate", 6.0)):
+        np.testing.assert_allclose(np.hypot(*cloud.nodes[cloud.boundaries[group]].T), radius)
+    np.testing.assert_array_equal(fronts.annulus(1.5, 6.0, towards_the_side, 0).nodes, cloud.nodes)
+
+
+def test_a_spacing_too_wide_for_fronts_leaves_scattered_nodes() -> None:
+    cloud = fronts.annulus(1.5, 6.0, lambda points: np.full(len(points), 2.1), 0)
+    assert len(cloud.boundaries["tool"]) == 12
+    np.testing.assert_allclose(np.hypot(*cloud.nodes[cloud.boundaries["tool"]].T), 1.5)
+    assert len(cloud.interior) > 0
+
+
+def test_the_nodes_of_sides_are_at_equal_steps_of_the_spacing() -> None:
+    walls = sides((0.0, -1.0), (2.0, 1.0), lambda points: 0.05 + 0.1 * np.abs(points[:, 1] + 1.0))
+    assert len(walls["bottom"]) == 41
+    gaps = np.diff(walls["left"][:, 1])
+    np.testing.assert_allclose(gaps[1:] / gaps[:-1], np.exp(0.1), rtol=0.01)
+    assert walls["top"][[0, -1]].tolist() == [[0.0, 1.0], [2.0, 1.0]]
+
+
 # Auto.
 
 
 @pytest.mark.parametrize("index", [1.0, 0.3, 0.1324, 0.05, 0.02])
-def test_auto_starts_with_three_quarters_of_the_layer_of_a_power_law(index: float) -> None:
-    """first = ¾ r_t n/2 in the spin, ¾ r_t n² in the orbit, between `smallest` and `spacing`."""
+def test_auto_starts_with_a_part_of_the_layer_of_a_power_law(index: float) -> None:
+    """first = 0.75 r_t n/2 in the spin, 0.7 r_t n² in the orbit, between `smallest` and `spacing` or `middle`."""
     law = PowerLaw(index=index, regularization=1e-6)
-    for motion, layer in (("spin", 1.5 * index / 2.0), ("orbit", 1.5 * index**2)):
+    for motion, wanted, smallest, largest in (
+        ("spin", 0.75 * 1.5 * index / 2.0, 0.008, 0.25),
+        ("orbit", 0.7 * 1.5 * index**2, 0.0066, 0.17 * min(index, 0.75**0.5) ** 0.2),
+    ):
         cloud = StirringTool(motion=motion, nodes=Auto()).cloud(law)
-        first = min(max(0.75 * layer, 0.008), 0.25)
+        first = min(max(wanted, smallest), largest)
         assert cloud.nearest_distance.min() == pytest.approx(first, rel=0.07)
-        assert len(cloud.nodes) < 15_000
+        assert len(cloud.nodes) < 25_000
+
+
+def test_auto_has_at_most_ten_thousand_nodes_for_the_orbit_of_the_paper() -> None:
+    """By finite elements of others its worst node is wrong by less than 0.5 % of the tool's speed."""
+    assert 9_000 < len(StirringTool(motion="orbit", nodes=Auto()).cloud(LAW).nodes) < 10_000
+
+
+def test_the_middle_spacing_holds_up_to_the_reach_of_the_tool() -> None:
+    nodes = GradedRings(first=0.05, growth=0.2, middle=0.1, reach=2.0, spacing=0.3)
+    radii = np.array([1.5, 1.75, 2.5, 3.5, 4.0, 6.0])
+    np.testing.assert_allclose(nodes.local_spacing(radii, 1.5), [0.05, 0.1, 0.1, 0.1, 0.2, 0.3])
 
 
 def test_auto_keeps_the_first_spacing_across_five_layers() -> None:
