@@ -72,7 +72,7 @@ def test_exactly_two_commands_set_up_and_go():
     commands = [line.strip() for line in README.splitlines() if "-m venv" in line]
     assert len(commands) == 2
     assert commands[0].endswith("nlsolve run studies/first.toml")
-    assert commands[1].endswith("-m pytest")
+    assert commands[1].endswith("-m pytest -n logical --dist loadfile")
 
 
 def test_every_shipped_study_is_listed_with_its_question():

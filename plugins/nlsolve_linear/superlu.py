@@ -39,8 +39,11 @@ class SuperLUFactors(Factors):
                 self._factors = scipy.sparse.linalg.splu(matrix, **ORDERINGS[ordering])
             else:
                 self._factors = scipy.sparse.linalg.splu(matrix[:, self._columns], permc_spec="NATURAL")
-        except RuntimeError as error:  # SuperLU's one way to say that a pivot vanished
-            raise SolveError(Status.SINGULAR_TANGENT, f"SuperLU: {error}") from error
+        except MemoryError as error:
+            raise SolveError(Status.OUT_OF_MEMORY, "SuperLU has no memory for the factors") from error
+        except RuntimeError as error:  # SuperLU's one way to say that a pivot vanished, or that it got no memory
+            status = Status.OUT_OF_MEMORY if "MALLOC" in str(error) else Status.SINGULAR_TANGENT
+            raise SolveError(status, f"SuperLU: {error}") from error
         self._inverse: np.ndarray = self._factors.perm_c if earlier is None else earlier._inverse
         self._order: np.ndarray = np.argsort(self._inverse) if earlier is None else earlier._order
         self.fill = int(self._factors.nnz)

@@ -111,6 +111,8 @@ def test_on_a_moved_cloud_kept_neighbours_conform(discretizer: Discretizer) -> N
 
     class Kept(type(discretizer)):  # type: ignore[misc]
         def operators(self, cloud: Cloud, volumetric: bool) -> Operators:
+            if len(cloud.nodes) != len(before.nodes):  # the check tries a cloud of too few nodes as well
+                return discretizer.operators(cloud, volumetric)
             found = discretizer.operators(before, volumetric)
             first = discretizer.moved(found, sheared(before, 0.1))
             assert first is not None

@@ -416,6 +416,17 @@ def test_a_loose_linear_solver_is_answered_for_by_the_outside_test() -> None:
     assert loose.residual_norm <= 1e-9 * flow.scale(near(flow, 0.7))
 
 
+@pytest.mark.parametrize("error", [MemoryError(), RuntimeError("SUPERLU_MALLOC fails for buf in intCalloc()")])
+def test_factors_without_memory_are_no_singular_tangent(error: Exception, monkeypatch: pytest.MonkeyPatch) -> None:
+    def fails(*_: Any, **__: Any) -> None:
+        raise error
+
+    monkeypatch.setattr(scipy.sparse.linalg, "splu", fails)
+    refused = refusal(lambda: SuperLU(ordering="colamd").factorize(tangent()))
+    assert refused.status is Status.OUT_OF_MEMORY
+    assert "SuperLU" in refused.detail
+
+
 @needs_pardiso
 class TestPardiso:
     def test_a_conservative_tangent_has_half_the_entries(self) -> None:
