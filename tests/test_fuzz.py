@@ -49,3 +49,40 @@ def test_a_crash_is_reported_with_its_document():
     broken = type(ending)(document, Status.CRASHED.word, "KeyError: 1 (/a/b.py:3)")
     assert "1 runs, 1 crashed" in report("runs", [broken])
     assert str(document) in report("runs", [broken])
+
+
+@pytest.mark.parametrize(
+    "document",
+    [
+        {
+            "scene": {"kind": "published", "problem": "powell-singular", "factor": 1e-150},
+            "solver": {"kind": "anm", "range": {"kind": "pade-pair"}},
+        },
+        {
+            "scene": {"kind": "p-laplacian", "nodes": 5, "dimension": 2, "power": 5.0, "factor": 1e-3},
+            "solver": {"kind": "anm", "form": "newton", "extrapolation": "pade", "range": {"kind": "pade-pair"}},
+        },
+        {
+            "scene": {"kind": "published", "problem": "watson-mgh", "factor": 1e6},
+            "solver": {
+                "kind": "anm",
+                "adaptive": True,
+                "residual": 1e-8,
+                "order": 30,
+                "range": {"kind": "last-term"},
+                "extrapolation": "pade",
+            },
+            "operator": {"kind": "mass"},
+        },
+        {
+            "scene": {"kind": "published", "problem": "gulf", "factor": 1e-150},
+            "solver": {"kind": "newton"},
+            "linear": {"kind": "rslab"},
+        },
+    ],
+    ids=["pade-pair", "pade-pair, newton form", "adaptive order", "J = 0 by rslab"],
+)
+def test_dense_algebra_that_fails_on_its_numbers_is_a_status(document):
+    ending = run(document, SECONDS)
+    assert ending.word != Status.CRASHED.word, ending.sentence
+    assert ending.sentence

@@ -106,6 +106,8 @@ def solve(
                 return ended(Status.CONVERGED, "R = 0, and the method has no further step to compare or to claim")
             denied |= bool(rows) and is_solved(before)
             return ended(error.status, error.detail)
+        except np.linalg.LinAlgError as error:  # of the dense algebra that a method has of its own
+            return ended(Status.NON_FINITE, f"the method's own linear algebra failed on its numbers: {error}")
         except CaseStopped as limit:
             return ended(limit.status, limit.detail)
         if step is None:

@@ -48,5 +48,5 @@ def is_symmetric(compressed: Any) -> bool:
     return (
         np.array_equal(turned.indptr, compressed.indptr)
         and np.array_equal(turned.indices, compressed.indices)
-        and bool(np.abs(turned.data - compressed.data).max() <= ASYMMETRY * np.abs(compressed.data).max())
+        and bool((np.abs(turned.data - compressed.data) <= ASYMMETRY * np.abs(compressed.data).max(initial=0.0)).all())
     )
