@@ -11,7 +11,7 @@ from nlsolve.contracts.continuum.law import ConstitutiveLaw, PowerForm, local_in
 from nlsolve.contracts.continuum.terms import NodeMotion, Physics, Recording, TimeSteps
 from nlsolve.contracts.linear_solver import Factors, LinearSolver
 from nlsolve.contracts.nonlinear_solver import KeptTangent, NonlinearSolver, Step
-from nlsolve.contracts.problem import Expansion, NonlinearProblem, norm, unit
+from nlsolve.contracts.problem import Expansion, NonlinearProblem, least_squares, norm, unit
 from nlsolve.contracts.rules.globalization import Globalization, Search
 from nlsolve.contracts.rules.homotopy_form import HomotopyForm, Recurrence
 from nlsolve.contracts.rules.operator import Assembly, IterationOperator
@@ -87,6 +87,7 @@ __all__ = [
     "cached_jacobian",
     "hat_gradients",
     "hookimpl",
+    "least_squares",
     "local_index",
     "norm",
     "stress",

@@ -19,8 +19,8 @@ import scipy.sparse as sp
 
 from nlsolve.algebra.measure import ROUNDING, Measure
 from nlsolve.contracts.linear_solver import Factors, LinearSolver
-from nlsolve.contracts.problem import NonlinearProblem, norm, random_signs
-from nlsolve.contracts.status import SolveError, Status
+from nlsolve.contracts.problem import NonlinearProblem, least_squares, norm, random_signs
+from nlsolve.contracts.status import SolveError
 from nlsolve.series import Array, NoSeries
 
 FALLEN = 1e-4  # part of the size it began with below which an unknown is taken for zero
@@ -171,10 +171,7 @@ class ByEquation(Measure):
 
     def _solved(self, matrix: Any, wanted: Array) -> Array:
         if matrix.shape[0] <= DENSE:
-            try:
-                return np.linalg.lstsq(matrix.toarray(), wanted, rcond=None)[0]
-            except np.linalg.LinAlgError as error:
-                raise SolveError(Status.NON_FINITE, f"least squares of the correction: {error}") from error
+            return least_squares(matrix.toarray(), wanted)[0]
         self._factors = self._linear.factorize(matrix, self._factors)
         return np.column_stack([self._factors.solve(column) for column in wanted.T])
 

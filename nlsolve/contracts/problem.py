@@ -43,6 +43,18 @@ def unit(vector: Array) -> float:
     return float(np.ldexp(0.5, np.frexp(largest)[1])) if 0.0 < largest < np.inf else 1.0
 
 
+def least_squares(matrix: Array, rhs: Array, noise: float | None = None) -> tuple[Array, int]:
+    """x (N,) or (N, C) of the least ‖A x − b‖₂, the smallest where many are, and the rank of A (M, N).
+
+    noise : singular values below this part of the largest count as zero; by default max(M, N) units of rounding.
+    Raises SolveError (not finite) where A or b is not: LAPACK would print its own complaint first.
+    """
+    if not (np.isfinite(matrix).all() and np.isfinite(rhs).all()):
+        raise SolveError(Status.NON_FINITE, "least squares of numbers that are not finite")
+    x, _, rank, _ = np.linalg.lstsq(matrix, rhs, rcond=noise)
+    return np.asarray(x, dtype=float), int(rank)
+
+
 def random_signs(size: int, count: int) -> Array:
     """Columns of ±1, (U, C), the same ones whenever they are asked for."""
     return np.where(np.random.default_rng(0).random((size, count)) < 0.5, -1.0, 1.0)

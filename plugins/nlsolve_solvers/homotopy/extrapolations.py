@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from nlsolve.plugin import unit
+from nlsolve.plugin import least_squares, unit
 
 NOISE = 1e-10  # directions of the W_j below this part of the largest are rounding and lower the degree of Δ
 ON_THE_PATH = 1.1  # a positive real pole up to here spoils W(a) on 0 < a ≤ 1
@@ -68,9 +68,9 @@ def pade(columns: np.ndarray, m: int) -> Extrapolation:
     scaled = columns / (sizes[0] * growth ** np.arange(p))
     left = np.concatenate([scaled[:, k - m : k][:, ::-1] for k in range(m, p)])  # W_{k−1} … W_{k−m}
     right = -np.concatenate([scaled[:, k] for k in range(m, p)])
-    d, _, rank, _ = np.linalg.lstsq(left, right, rcond=NOISE)
+    d, rank = least_squares(left, right, NOISE)
     if rank < m:
-        return pade(columns, int(rank))
+        return pade(columns, rank)
     return Extrapolation(np.concatenate([[1.0], d * growth ** np.arange(1, m + 1)]), p)
 
 

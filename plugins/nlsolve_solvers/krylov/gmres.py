@@ -18,7 +18,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from nlsolve.plugin import SolveError, Status, norm
+from nlsolve.plugin import SolveError, Status, least_squares, norm
 
 Map = Callable[[np.ndarray], np.ndarray]
 
@@ -69,7 +69,7 @@ def gmres(product: Map, precondition: Map, b: np.ndarray, tolerance: float, most
             break
         basis[k + 1] = w / beyond
     count = len(rotations)
-    y = np.linalg.lstsq(triangle[:count, :count], np.array(rotated[:count]), rcond=None)[0]
+    y, _ = least_squares(triangle[:count, :count], np.array(rotated[:count]))
     return Krylov(y @ directions[:count], left, count)
 
 
