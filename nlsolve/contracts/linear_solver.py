@@ -18,6 +18,10 @@ class Factors(ABC):
     """Name of the column ordering that was used."""
     fill: int = 0
     """Entries stored in the factors."""
+    chosen: str | None = None
+    """Kind of the linear solver that made them, where one chooses among several."""
+    lends: bool = True
+    """Whether later factorisations are cheaper with these as `previous`."""
     attempts: int = 1
     """Factorisations carried out to obtain these factors, including trials of orderings; all of them are counted."""
     solves: int = 1
@@ -41,7 +45,7 @@ class LinearSolver(Component, ABC):
     """Factorises sparse matrices. The tangent K* carries out and counts the `refinement` that is declared here."""
 
     noun: ClassVar[str] = "linear"
-    default_kind: ClassVar[str | None] = "superlu"
+    default_kind: ClassVar[str | None] = "auto"
 
     refinement: int = Field(0, ge=0, description="steps of iterative refinement after each triangular solve")
 

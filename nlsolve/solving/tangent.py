@@ -138,9 +138,10 @@ class Tangent(KeptTangent):
         self._told = False
 
     def facts(self) -> dict[str, Any]:
-        """Ordering, fill and condition of the last factors, under the names of `nlsolve.results.columns.RUNS`."""
+        """Choice, ordering, fill and condition of the last factors, under the names of `nlsolve.results.columns.RUNS`."""
         factors = self.factors
         return {
+            "linear_chosen": factors.chosen if factors else None,
             "ordering": factors.ordering if factors else None,
             "fill": factors.fill if factors else None,
             "condition": factors.condition() if factors else None,

@@ -1,10 +1,11 @@
-"""Factorisations of sparse matrices: SuperLU, LAPACK, rslab, PARDISO, and GMRES behind an incomplete LU."""
+"""Factorisations of sparse matrices: SuperLU, LAPACK, rslab, PARDISO, the choice among them, and GMRES."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 
 from nlsolve.plugin import Component, hookimpl
+from nlsolve_linear.auto import Auto
 from nlsolve_linear.ilu_gmres import IluGmres
 from nlsolve_linear.lapack import Lapack
 from nlsolve_linear.pardiso import Pardiso
@@ -14,4 +15,4 @@ from nlsolve_linear.superlu import SuperLU
 
 @hookimpl
 def nlsolve_components() -> Iterable[type[Component]]:
-    return [SuperLU, Lapack, Rslab, Pardiso, IluGmres]
+    return [Auto, SuperLU, Lapack, Rslab, Pardiso, IluGmres]

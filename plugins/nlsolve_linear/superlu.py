@@ -30,6 +30,7 @@ class SuperLUFactors(Factors):
 
     def __init__(self, matrix: Any, ordering: str, previous: SuperLUFactors | None = None) -> None:
         self.ordering, self._pattern = ordering, (matrix.indptr, matrix.indices)
+        self.lends = ordering in REUSED
         earlier = previous if previous is not None and ordering in REUSED and previous._like(self) else None
         # A[:, columns] is factorised, and x = y[places] of its solution y.
         self._columns: Any = slice(None) if earlier is None else earlier._order

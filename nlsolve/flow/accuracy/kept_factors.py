@@ -53,8 +53,14 @@ class Preconditioned(Factors):
             x = self._by_gmres(rhs)
             if np.linalg.norm(rhs - self._matrix @ x) <= POOR * np.linalg.norm(rhs):
                 return x
-            self.factors, self._own = self._linear.factorize(self._matrix, self.factors), True
+            self._renew()
         return self.factors.solve(rhs)
+
+    def _renew(self) -> None:
+        """Factorise A; earlier factors that do not help give up their memory first."""
+        earlier = self.factors if self.factors.lends else None
+        del self.factors
+        self.factors, self._own = self._linear.factorize(self._matrix, earlier), True
 
     def _by_gmres(self, rhs: Array) -> Array:
         product = scipy.sparse.linalg.LinearOperator(
