@@ -481,3 +481,12 @@ def test_equilibrium_brings_rows_and_columns_to_one_size(symmetric: bool) -> Non
     largest = np.delete(np.abs(even.toarray()).max(axis=0), 3)
     assert ((largest >= 0.1) & (largest <= 8.0)).all()
     assert set(np.frexp(rows)[0]) == {0.5}
+
+
+def test_a_matrix_whose_entries_cancel_on_one_side_only_is_symmetric() -> None:
+    """As triangles have it at the exact velocity: entries that vanish are stored in one half and not in the other."""
+    stored = sp.csr_array((np.array([2.0, 1.0, 1e-16, 1.0, 2.0, 2.0]), [0, 1, 2, 0, 1, 2], [0, 3, 5, 6]), shape=(3, 3))
+    assert stored.nnz == 6
+    assert is_symmetric(stored)
+    stored.data[2] = 1e-9
+    assert not is_symmetric(stored)
