@@ -12,6 +12,7 @@ class Status(Enum):
     CONVERGED = "the stopping test was met"
     OTHER_ROOT = "the stopping test was met at a root other than the known ones"
     BUDGET_SPENT = "the iterations allowed were used up before the stopping test was met"
+    INACCURATE = "the equations were solved, and the error is estimated as larger than was asked for"
     STAGNATED = "the residual stopped falling well above the tolerance"
     DIVERGED = "the residual grew far beyond its first value"
     NON_FINITE = "a residual, a coefficient or an iterate was not a finite number"

@@ -132,7 +132,7 @@ class FlowSimulation(Simulation):
             outcome = yield from iterate_pressure(state, lambda: self.increment(0, state.flow_of(parts.law)))
             if outcome.status is Status.CONVERGED and not self.adaptation.reached:
                 detail = self.adaptation.shortfall(len(state.cloud.nodes))
-                outcome = replace(outcome, status=Status.BUDGET_SPENT, detail=detail)
+                outcome = replace(outcome, status=Status.INACCURATE, detail=detail)
         if outcome.status is Status.CONVERGED:
             assert state.flow is not None
             self.record_beginning(state.flow)

@@ -138,7 +138,7 @@ class Tangent(KeptTangent):
         self._told = False
 
     def facts(self) -> dict[str, Any]:
-        """Choice, ordering, fill and condition of the last factors, under the names of `nlsolve.results.columns.RUNS`."""
+        """Choice, ordering, fill and condition of the last factors, by the names in `nlsolve.results.columns.RUNS`."""
         factors = self.factors
         return {
             "linear_chosen": factors.chosen if factors else None,

@@ -17,7 +17,7 @@ FASTEST: tuple[type[LinearSolver], ...] = (Pardiso, Rslab, SuperLU)
 
 
 class Auto(LinearSolver):
-    """SuperLU for a small matrix; for a larger one PARDISO, or else rslab, or else SuperLU: the first that is installed.
+    """SuperLU for a small matrix; for a larger one the first that is installed of PARDISO, rslab and SuperLU.
 
     Where that finds the matrix singular, the next one is asked: those with pivots in supernodes give up earlier than
     SuperLU, which has the last word. The column `linear_chosen` says which it was.

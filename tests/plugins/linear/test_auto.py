@@ -1,4 +1,4 @@
-"""`auto`: SuperLU for small matrices, the fastest that is installed for larger ones, and SuperLU's word on singular ones."""
+"""`auto`: SuperLU for small matrices, the fastest installed for larger ones, SuperLU's word on singular ones."""
 
 from __future__ import annotations
 
