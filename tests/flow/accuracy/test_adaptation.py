@@ -14,7 +14,8 @@ from pydantic import ValidationError
 
 from nlsolve.contracts.scene import Misfit, Simulation
 from nlsolve.flow import march as marching
-from nlsolve.plugin import AdaptiveNodes, FlowScene, TimeSteps
+from nlsolve.flow.continuation import Start
+from nlsolve.plugin import AdaptiveNodes, FlowScene, Physics, TimeSteps
 from nlsolve.series import Array
 from nlsolve.solving.simulate import run_case
 from nlsolve.solving.way import Way
@@ -62,6 +63,24 @@ def test_the_error_asked_for_is_reached(scene: FlowScene, index: float, error: f
     assert row["seconds_all"] == pytest.approx(
         row["seconds"] + row["seconds_start"] + row["seconds_operators"] + row["seconds_estimate"]
     )
+
+
+@pytest.mark.slow
+def test_the_orbit_at_the_smallest_index_reaches_one_percent() -> None:
+    """The independent reference gave 0.31 % inside and 0.60 % at the worst node of these 19,217."""
+    orbit = StirringTool(motion="orbit", nodes=AdaptiveNodes(error=0.01))
+    row, _, _ = solved(
+        case(
+            orbit,
+            0.05,
+            law=PowerLaw(index=0.05, regularization=1e-3),
+            start=Start(adaptive=True),
+            physics=Physics(penalty=1e4),
+        )
+    )
+    assert row["status"] == "converged", row["message"]
+    assert max(row["velocity_error_estimate"], row["worst_error_estimate"]) <= 0.01
+    assert row["nodes"] <= 20_000
 
 
 SPIN = StirringTool(nodes=AdaptiveNodes(error=0.02, spacing=0.5))
