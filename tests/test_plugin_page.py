@@ -85,7 +85,8 @@ def text(page: str) -> str:
         lines = len([line for line in plugin.splitlines() if line])
         parts.append(
             f"## {contract_of(type(component)).__name__}\n\n{TITLES[contract]}, in {lines} lines, as "
-            f"`nlsolve new {contract} my-{contract}` writes it:\n\n```python\n{plugin}```\n\n"
+            f"`nlsolve new {contract} my-{contract}` writes it:\n\n"
+            f"<!-- file: my_{contract.replace('-', '_')}.py -->\n```python\n{plugin}```\n\n"
             f"and the study that uses it:\n\n```toml\n{study}```\n\nWhat it is held to:\n\n"
             "| promise | what is promised |\n| --- | --- |\n" + "".join(promises(component))
         )
