@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import sys
-from importlib.metadata import version
+from importlib import metadata
 from pathlib import Path
+from typing import Any
 
 sys.path.insert(0, str(Path(__file__).parent))  # the extensions beside this file
 
 project = "nlsolve"
 author = "the authors of nlsolve"
-release = version("nlsolve")
+release = metadata.version("nlsolve")
 html_title = f"nlsolve {release}"
 html_theme = "furo"
 html_copy_source = False
@@ -32,3 +33,13 @@ autodoc_typehints = "none"  # the signature of a function is as its source has i
 autodoc_preserve_defaults = True
 nitpicky = True
 nitpick_ignore_regex = [("py:.*", ".*")]  # types of other libraries, which have pages of their own elsewhere
+
+
+def setup(app: Any) -> None:
+    """CONTRIBUTING.md is at the top of the source, and in the site under `house`."""
+    app.connect("source-read", lambda app, name, source: source.append(within(source.pop())))
+
+
+def within(page: str) -> str:
+    """A page whose links to files of the top lead to the pages that include them."""
+    return page.replace("](../CONTRIBUTING.md)", "](house/contributing.md)")
