@@ -5,7 +5,6 @@ from __future__ import annotations
 import sys
 from importlib import metadata
 from pathlib import Path
-from typing import Any
 
 sys.path.insert(0, str(Path(__file__).parent))  # the extensions beside this file
 
@@ -15,15 +14,18 @@ release = metadata.version("nlsolve")
 html_title = f"nlsolve {release}"
 html_theme = "furo"
 html_copy_source = False
+html_show_copyright = False
 
-extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinxcontrib.mermaid", "docstrings", "gallery"]
+extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinxcontrib.mermaid", "docstrings", "gallery", "links"]
 exclude_patterns: list[str] = []
 
-myst_heading_anchors = 3  # a link to a heading is checked, as GitHub writes it: page.md#words-of-the-heading
+myst_heading_anchors = 3  # a link to a heading is checked: page.md#words-of-the-heading
+myst_heading_slug_func = "links.slug"
 myst_fence_as_directive = ["mermaid"]
 suppress_warnings: list[str] = []
 
 nb_execution_mode = "force"
+nb_execution_in_temp = True
 nb_execution_raise_on_error = True
 nb_execution_timeout = 120
 nb_merge_streams = True
@@ -33,13 +35,3 @@ autodoc_typehints = "none"  # the signature of a function is as its source has i
 autodoc_preserve_defaults = True
 nitpicky = True
 nitpick_ignore_regex = [("py:.*", ".*")]  # types of other libraries, which have pages of their own elsewhere
-
-
-def setup(app: Any) -> None:
-    """CONTRIBUTING.md is at the top of the source, and in the site under `house`."""
-    app.connect("source-read", lambda app, name, source: source.append(within(source.pop())))
-
-
-def within(page: str) -> str:
-    """A page whose links to files of the top lead to the pages that include them."""
-    return page.replace("](../CONTRIBUTING.md)", "](house/contributing.md)")

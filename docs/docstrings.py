@@ -1,7 +1,7 @@
 """Docstrings of nlsolve for Sphinx, which reads reStructuredText: in them * is a product and |x| a modulus.
 
-Words are escaped; what stands in backticks is code; "name : meaning" becomes an item of a list, and so does "- …"; what is indented by
-four columns behind an empty line is code.
+Words are escaped; what stands in backticks is code; "name : meaning" becomes an item of a list, and so does "- …"; what
+is indented by four columns behind an empty line is code.
 """
 
 from __future__ import annotations

@@ -4,14 +4,16 @@
     python docs/gallery.py --full                # each in full, days
     python docs/gallery.py first paper/figures   # these only
 
-Pictures are kept in build/gallery, as results folders are: what is there is not computed again. As an extension of Sphinx, this module adds
-them to the page gallery.md; of a study without pictures the page says how they are drawn.
+Pictures are kept in build/gallery, as results folders are: what is there is not computed again. As an extension of
+Sphinx, this module adds them to the page gallery.md; of a study without pictures the page says how they are drawn.
 """
 
 from __future__ import annotations
 
 import argparse
+import tomllib
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -23,10 +25,11 @@ DRAWN = ROOT / "build" / "gallery"
 PAGE = "gallery"
 
 
+@cache
 def studies() -> dict[str, nlsolve.Study]:
     """The shipped studies that draw figures, by name: "first", "paper/figures"."""
-    found = {path.relative_to(STUDIES).with_suffix("").as_posix(): path for path in sorted(STUDIES.rglob("*.toml"))}
-    return {name: study for name, path in found.items() if (study := nlsolve.Study.from_toml(path)).figures}
+    declared = [path for path in sorted(STUDIES.rglob("*.toml")) if "figure" in tomllib.loads(path.read_text("utf-8"))]
+    return {path.relative_to(STUDIES).with_suffix("").as_posix(): nlsolve.Study.from_toml(path) for path in declared}
 
 
 def folder(name: str, full: bool) -> Path:

@@ -8,7 +8,7 @@ A page is run from top to bottom in a folder of its own. What a block must do fo
     sh                   commands of nlsolve are parsed, files that a command names are there
     text, latex, mermaid words
 
-In lines that are shown, "…" stands for any words; lines of seconds are not compared. A comment right before a block says more:
+In lines that are shown, "…" stands for any words; lines of seconds are not compared. A comment before a block says:
 
     <!-- file: NAME -->          the block is also written to a file, for the blocks behind it
     <!-- part of: FILE -->       the block is added to this study; to pyproject.toml: it is parsed
@@ -42,7 +42,7 @@ ROOT = Path(__file__).parent.parent
 SITE = ROOT / "docs"
 PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted(SITE.rglob("*.md"))]
 WORDS = {"text", "latex", "mermaid"}
-DIRECTIVES = {"{eval-rst}", "{toctree}", "{gallery}", "{include}"}
+DIRECTIVES = {"{eval-rst}", "{toctree}", "{include}"}
 """Blocks that Sphinx builds."""
 
 MARK = re.compile(r"<!-- (file|part of|not run): (.+?) -->\s*\Z")

@@ -1,4 +1,4 @@
-"""docs/reference/ tells the truth: columns, statuses, doubts, kinds, hooks, commands and public names are those of the code.
+"""docs/reference/ tells the truth: columns, statuses, doubts, kinds, hooks, commands and names are those of the code.
 
 After a change of one of them, `.venv/bin/python tests/docs/test_reference.py` writes the pages anew.
 """
@@ -31,10 +31,11 @@ ROOT = Path(__file__).parents[2]
 FOLDER = ROOT / "docs" / "reference"
 NOTE = "This page is generated (`.venv/bin/python tests/docs/test_reference.py`), and a test holds it to the code."
 
+SURROUNDINGS = "nlsolve/running/engines/processes/surroundings.py"
 OTHER_DOUBTS = {
     "nlsolve/algebra/root_search.py": "no root is near",
     "nlsolve/solving/simulate.py": "steps with no counted",
-    "nlsolve/running/engines/processes/surroundings.py": "work were done in other processes and not counted",
+    SURROUNDINGS: "work were done in other processes and not counted",
     "nlsolve/flow/validity.py": "the error could not be estimated",
 }
 """Where a doubt is made that is not an audit above its limit, and words of its sentence."""
@@ -59,8 +60,9 @@ def columns() -> str:
         parts.append(f"## `{name}`\n\n{meaning[0].upper()}{meaning[1:]}.\n")
         parts.append(table("column | unit | symbol | meaning", map(of_column, frame.values())) + "\n")
     parts.append(
-        "Behind these stand, in `runs`, all parameters of the case, dotted (`solver.order`), and what a scene measures that no "
-        "column knows (`measured.NAME`); in `steps`, what a method notes of a step (`note.NAME`).\n\n## Columns that had another name\n"
+        "Behind these stand, in `runs`, all parameters of the case, dotted (`solver.order`), and what a scene measures "
+        "that no column knows (`measured.NAME`); in `steps`, what a method notes of a step (`note.NAME`).\n\n"
+        "## Columns that had another name\n"
     )
     parts.append(table("once | now", ([f"`{old}`", f"`{new}`"] for old, new in RENAMED.items())) + "\n")
     return "\n".join(parts)
@@ -87,22 +89,22 @@ def endings() -> str:
 
 ## Statuses
 
-The column `status` has the word, the column `message` the sentence or one that says more. `Status.of(word)` is the value.
+The column `status` has the word, `message` the sentence or one that says more. `Status.of(word)` is the value.
 
 {table("word | what has happened", ([status.word, status.sentence] for status in Status))}
 
 ## Doubts
 
-The column `doubt` of a converged case says in sentences why its numbers may be wrong, and the way out; it is empty when nothing is
-known against them. A flow is audited from its own solution; above the limit an audit is a doubt:
+The column `doubt` of a converged case says in sentences why its numbers may be wrong, and the way out; it is empty when
+nothing is known against them. A flow is audited from its own solution; above the limit an audit is a doubt:
 
 {table("audit | limit | what a larger value means | a doubt", audits)}
 
 Other reasons for doubt:
 
-- a system has met its stopping test, but {OTHER_DOUBTS["nlsolve/algebra/root_search.py"]}: Newton steps lead away from where it ended;
+- a system met its stopping test, but {OTHER_DOUBTS["nlsolve/algebra/root_search.py"]}: Newton steps lead away;
 - a method took {OTHER_DOUBTS["nlsolve/solving/simulate.py"]} work, so that its counts tell less than it did;
-- seconds of {OTHER_DOUBTS["nlsolve/running/engines/processes/surroundings.py"]}, or processes were left running;
+- seconds of {OTHER_DOUBTS[SURROUNDINGS]}, or processes were left running;
 - audits could not be made, or {OTHER_DOUBTS["nlsolve/flow/validity.py"]}, because an operator could not be built.
 """
 
@@ -116,8 +118,9 @@ def first_party() -> Registry:
 def kinds() -> str:
     registry = first_party()
     parts = [
-        f"# Contracts, kinds and the hook\n\n{NOTE}\n\nWhat every kind takes is in [all keys of a study](../study-keys.md), what a contract asks of a class in "
-        "[plugins](../plugins.md), its class in [the plugin authors' names](plugin.md).\n"
+        f"# Contracts, kinds and the hook\n\n{NOTE}\n\nWhat every kind takes is in [all keys of a study]"
+        "(../study-keys.md), what a contract asks of a class in [plugins](../plugins.md), its class in [the plugin "
+        "authors' names](plugin.md).\n"
     ]
     for noun, contract in CONTRACTS.items():
         link = f"../plugins.md#{contract.__name__.lower()}"
@@ -174,22 +177,34 @@ def option(each: Any) -> str:
     return f"`{each.opts[0]}{value}`" + (", may be repeated" if each.multiple else "")
 
 
+def directive(door: ModuleType, name: str) -> str:
+    """How autodoc documents a name: what is neither class nor function has its docstring where it is assigned."""
+    thing = getattr(door, name)
+    if inspect.isclass(thing):
+        return f"autoclass:: {door.__name__}.{name}\n   :members:\n   :exclude-members: model_config"
+    if inspect.isfunction(thing):
+        return f"autofunction:: {door.__name__}.{name}"
+    assigned = rf"^{name}(: TypeAlias)? = "
+    (home,) = (
+        path for path in (ROOT / "nlsolve").rglob("*.py") if re.search(assigned, path.read_text("utf-8"), re.MULTILINE)
+    )
+    module = home.relative_to(ROOT).with_suffix("").as_posix().replace("/", ".")
+    return f"autodata:: {module}.{name}\n   :no-value:"
+
+
 def names(door: ModuleType, title: str, words: str) -> Callable[[], str]:
     """The page of the public names of a module, which autodoc writes."""
 
     def page() -> str:
         parts = [f"# {title}\n\n{NOTE} Sphinx writes the docstrings into the site.\n\n{words}\n"]
         for name in door.__all__:
-            thing = getattr(door, name)
             if name == "__version__":
                 continue
             parts.append(f"## {name}\n")
             if door is not nlsolve and name in nlsolve.__all__:
                 parts.append(f"The same as [`nlsolve.{name}`](nlsolve.md#{name.lower()}).\n")
                 continue
-            how = "autoclass" if inspect.isclass(thing) else "autofunction" if callable(thing) else "autodata"
-            members = "\n   :members:" if how == "autoclass" else ""
-            parts.append(f"```{{eval-rst}}\n.. {how}:: {door.__name__}.{name}{members}\n```\n")
+            parts.append(f"```{{eval-rst}}\n.. {directive(door, name)}\n```\n")
         return "\n".join(parts)
 
     return page
