@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import unicodedata
+from pathlib import Path
 from typing import Any
 
 
@@ -13,6 +14,28 @@ def slug(heading: str) -> str:
         sign for sign in heading.lower().strip() if re.match(r"[\w\- ]", sign) and unicodedata.category(sign) != "No"
     )
     return "".join(kept).replace(" ", "-")
+
+
+CODE = re.compile(r"^ *```.*?^ *```", flags=re.MULTILINE | re.DOTALL)
+
+
+def slugs(page: str) -> set[str]:
+    """The anchors of the headings of a page; of several that are the same the later ones are numbered."""
+    found = [slug(heading) for heading in re.findall(r"^#+ (.+)$", CODE.sub("", page), flags=re.MULTILINE)]
+    return {name if name not in found[:i] else f"{name}-{found[:i].count(name)}" for i, name in enumerate(found)}
+
+
+def broken(path: Path) -> list[str]:
+    """The links of a page to files, and to headings of pages, that are not there."""
+    links = re.findall(r"\]\(([^)\s]+)\)", CODE.sub("", path.read_text(encoding="utf-8")))
+    return [link for link in links if "://" not in link and not leads(link, path)]
+
+
+def leads(link: str, path: Path) -> bool:
+    """Whether what a link of the page at `path` names is there."""
+    file, _, anchor = link.partition("#")
+    target = path.parent / file if file else path
+    return target.exists() and (not anchor or anchor in slugs(target.read_text(encoding="utf-8")))
 
 
 def within(page: str) -> str:

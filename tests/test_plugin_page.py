@@ -5,6 +5,7 @@ After a change of a template or a check, `.venv/bin/python tests/test_plugin_pag
 
 from __future__ import annotations
 
+import re
 import sys
 from collections.abc import Iterator
 from pathlib import Path
@@ -105,6 +106,14 @@ def verdicts_of_simulation(scene: Component) -> Iterator[str]:
 def test_the_page_is_up_to_date() -> None:
     page = PAGE.read_text(encoding="utf-8")
     assert page == text(page)
+
+
+def test_first_plugins_are_short() -> None:
+    shown = re.findall(r"Your first (.+), in (\d+) lines", PAGE.read_text(encoding="utf-8"))
+    lines = {contract: int(count) for contract, count in shown}
+    assert len(lines) == len(CONTRACTS)
+    assert lines["solver"] <= 40
+    assert lines["law"] <= 15
 
 
 def test_every_contract_has_a_section() -> None:

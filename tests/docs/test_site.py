@@ -9,7 +9,12 @@ from pathlib import Path
 import gallery
 import pytest
 from docstrings import restructured
-from links import slug
+from links import broken, slug
+from pages import PAGES
+
+import nlsolve
+import nlsolve.plugin
+import nlsolve.testing
 
 ROOT = Path(__file__).parents[2]
 CONFIGURATION = ROOT / "docs"
@@ -87,6 +92,32 @@ def test_docstrings_become_restructured_text():
 )
 def test_anchors_are_those_of_github(heading, anchor):
     assert slug(heading) == anchor
+
+
+@pytest.mark.parametrize("path", [*PAGES, ROOT / "CHANGELOG.md"], ids=lambda path: path.relative_to(ROOT).as_posix())
+def test_links_lead_somewhere_where_the_page_is_read_as_it_is(path):
+    assert broken(path) == []
+
+
+def test_links_to_nothing_are_found(tmp_path):
+    page, other = tmp_path / "page.md", tmp_path / "other.md"
+    links = "[1](#a-b) [2](#c) [3](other.md) [4](other.md#x) [5](no.md#x) [6](https://example.org/#x) [7](#a-b-1)"
+    page.write_text(f"# A `b`\n\n{links}\n\n# A b\n", encoding="utf-8")
+    other.write_text("# Other\n\n```sh\n# x\n```\n", encoding="utf-8")
+    assert broken(page) == ["#c", "other.md#x", "no.md#x"]
+
+
+@pytest.mark.slow
+def test_the_site_is_built_and_has_every_public_name(tmp_path):
+    command = [sys.executable, "-m", "sphinx", "-q", "-W", "--keep-going", "-b", "html", CONFIGURATION, tmp_path]
+    told = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert told.returncode == 0, told.stderr
+    html = "".join(page.read_text(encoding="utf-8") for page in (tmp_path / "reference").glob("*.html"))
+    for door in (nlsolve, nlsolve.plugin, nlsolve.testing):
+        missing = {
+            name for name in door.__all__ if f'id="{door.__name__}.{name}"' not in html and f">{name}<" not in html
+        }
+        assert missing - {"__version__"} == set()
 
 
 @pytest.fixture
