@@ -13,6 +13,8 @@ author = "the authors of nlsolve"
 release = metadata.version("nlsolve")
 html_title = f"nlsolve {release}"
 html_theme = "furo"
+html_static_path = ["site"]
+html_css_files = ["wide.css"]
 html_copy_source = False
 html_show_copyright = False
 
