@@ -21,6 +21,8 @@ html_show_copyright = False
 extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinxcontrib.mermaid", "docstrings", "gallery", "links"]
 exclude_patterns: list[str] = []
 
+smartquotes = False  # --retry stays --retry
+myst_enable_extensions = ["dollarmath"]
 myst_heading_anchors = 3  # a link to a heading is checked: page.md#words-of-the-heading
 myst_heading_slug_func = "links.slug"
 myst_fence_as_directive = ["mermaid"]

@@ -70,7 +70,7 @@ def columns() -> str:
 
 def of_column(column: Column) -> list[str]:
     said = column.meaning + ("; read from a clock" if column.timed else "")
-    return [f"`{column.name}`", column.unit, column.symbol, said]
+    return [f"`{column.name}`", column.unit, column.symbol.replace(r"\|", r"\Vert "), said]
 
 
 def endings() -> str:
