@@ -5,6 +5,7 @@ After a change of a template or a check, `.venv/bin/python tests/test_plugin_pag
 
 from __future__ import annotations
 
+import re
 import sys
 from collections.abc import Iterator
 from pathlib import Path
@@ -85,7 +86,8 @@ def text(page: str) -> str:
         lines = len([line for line in plugin.splitlines() if line])
         parts.append(
             f"## {contract_of(type(component)).__name__}\n\n{TITLES[contract]}, in {lines} lines, as "
-            f"`nlsolve new {contract} my-{contract}` writes it:\n\n```python\n{plugin}```\n\n"
+            f"`nlsolve new {contract} my-{contract}` writes it:\n\n"
+            f"<!-- file: my_{contract.replace('-', '_')}.py -->\n```python\n{plugin}```\n\n"
             f"and the study that uses it:\n\n```toml\n{study}```\n\nWhat it is held to:\n\n"
             "| promise | what is promised |\n| --- | --- |\n" + "".join(promises(component))
         )
@@ -104,6 +106,14 @@ def verdicts_of_simulation(scene: Component) -> Iterator[str]:
 def test_the_page_is_up_to_date() -> None:
     page = PAGE.read_text(encoding="utf-8")
     assert page == text(page)
+
+
+def test_first_plugins_are_short() -> None:
+    shown = re.findall(r"Your first (.+), in (\d+) lines", PAGE.read_text(encoding="utf-8"))
+    lines = {contract: int(count) for contract, count in shown}
+    assert len(lines) == len(CONTRACTS)
+    assert lines["solver"] <= 40
+    assert lines["law"] <= 15
 
 
 def test_every_contract_has_a_section() -> None:

@@ -19,6 +19,7 @@ PROJECT = "nlsolve"
 
 hookspec = pluggy.HookspecMarker(PROJECT)
 hookimpl = pluggy.HookimplMarker(PROJECT)
+"""Marks the function of a plugin's module that implements a hook: `@hookimpl`."""
 
 
 @hookspec

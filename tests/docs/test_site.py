@@ -1,0 +1,144 @@
+"""The site: what its extensions write, and that its build finds links to nothing. `.ci/run` builds all pages."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import gallery
+import pytest
+from docstrings import restructured
+from links import broken, slug
+from pages import PAGES
+
+import nlsolve
+import nlsolve.plugin
+import nlsolve.testing
+
+ROOT = Path(__file__).parents[2]
+CONFIGURATION = ROOT / "docs"
+
+
+def build(pages: dict[str, str], folder: Path) -> subprocess.CompletedProcess[str]:
+    """Build a site of these pages by the configuration of the real one."""
+    source = folder / "source"
+    source.mkdir()
+    for name, text in pages.items():
+        (source / name).write_text(text, encoding="utf-8")
+    command = [sys.executable, "-m", "sphinx", "-q", "-W", "--keep-going", "-b", "html", "-c", CONFIGURATION]
+    return subprocess.run([*command, source, folder / "built"], capture_output=True, text=True, check=False)
+
+
+def test_what_is_not_there_fails_the_build(tmp_path):
+    pages = {
+        "index.md": "# Site\n\n```{toctree}\none\n```\n",
+        "one.md": "# One\n\n[a](nothing.md), [b](index.md#nowhere), [c](#here-neither)\n\n```{nothing}\n```\n",
+        "lost.md": "# Not in the list of pages\n",
+        "names.md": "---\norphan: true\n---\n# Names\n\n```{eval-rst}\n.. autofunction:: nlsolve.dissolve\n```\n",
+    }
+    told = build(pages, tmp_path)
+    assert told.returncode == 1
+    for fault in (
+        "nothing.md",
+        "nowhere",
+        "here-neither",
+        "Unknown directive",
+        "lost.md",
+        "failed to import 'dissolve'",
+    ):
+        assert fault in told.stderr, fault
+
+
+def test_what_is_there_passes(tmp_path):
+    pages = {
+        "index.md": "# Site\n\n[a](#a-heading), [one](one.md#one-two)\n\n## A heading\n\n```{toctree}\none\n```\n",
+        "one.md": "# One two\n\n```{eval-rst}\n.. autofunction:: nlsolve.solve\n```\n\n```mermaid\nflowchart TD\n```\n",
+    }
+    told = build(pages, tmp_path)
+    assert told.returncode == 0, told.stderr
+    assert "u_0, (U,); may be left out" in (tmp_path / "built" / "one.html").read_text("utf-8")
+
+
+DOCSTRING = """\
+K* W_j = |r| in `one` line.
+
+solver : by kind, or
+    a table.
+a, b : numbers.
+
+Words.
+
+    code * here
+
+- an item
+"""
+
+
+def test_docstrings_become_restructured_text():
+    assert "\n".join(restructured(DOCSTRING.splitlines())) == (
+        "K\\* W\\_j = \\|r\\| in ``one``\\  line.\n\n\n- solver : by kind, or\n  a table.\n- a, b : numbers.\n\n\n"
+        "Words.\n\n::\n\n    code * here\n\n\n- an item"
+    )
+
+
+@pytest.mark.parametrize(
+    ("heading", "anchor"),
+    [
+        ("Disturbed starts, small n and ε₀: `studies/a.toml`", "disturbed-starts-small-n-and-ε-studiesatoml"),
+        ("`[[table]]`", "table"),
+        ("range_rule - last-term", "range_rule---last-term"),
+    ],
+)
+def test_anchors_are_those_of_github(heading, anchor):
+    assert slug(heading) == anchor
+
+
+@pytest.mark.parametrize("path", [*PAGES, ROOT / "CHANGELOG.md"], ids=lambda path: path.relative_to(ROOT).as_posix())
+def test_links_lead_somewhere_where_the_page_is_read_as_it_is(path):
+    assert broken(path) == []
+
+
+def test_links_to_nothing_are_found(tmp_path):
+    page, other = tmp_path / "page.md", tmp_path / "other.md"
+    links = "[1](#a-b) [2](#c) [3](other.md) [4](other.md#x) [5](no.md#x) [6](https://example.org/#x) [7](#a-b-1)"
+    page.write_text(f"# A `b`\n\n{links}\n\n# A b\n", encoding="utf-8")
+    other.write_text("# Other\n\n```sh\n# x\n```\n", encoding="utf-8")
+    assert broken(page) == ["#c", "other.md#x", "no.md#x"]
+
+
+@pytest.mark.slow
+def test_the_site_is_built_and_has_every_public_name(tmp_path):
+    command = [sys.executable, "-m", "sphinx", "-q", "-W", "--keep-going", "-b", "html", CONFIGURATION, tmp_path]
+    told = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert told.returncode == 0, told.stderr
+    html = "".join(page.read_text(encoding="utf-8") for page in (tmp_path / "reference").glob("*.html"))
+    for door in (nlsolve, nlsolve.plugin, nlsolve.testing):
+        missing = {
+            name for name in door.__all__ if f'id="{door.__name__}.{name}"' not in html and f">{name}<" not in html
+        }
+        assert missing - {"__version__"} == set()
+
+
+@pytest.fixture
+def drawn(tmp_path, monkeypatch):
+    monkeypatch.setattr(gallery, "DRAWN", ROOT / "build" / "nothing")
+    return gallery
+
+
+def test_a_study_without_pictures_says_how_they_are_drawn(drawn):
+    sections = "\n".join(drawn.page())
+    assert sections.count("## studies/") == len(drawn.studies()) > 8
+    assert "`python docs/gallery.py paper/figures` draws it" in sections
+
+
+def test_pictures_are_shown_with_their_captions(monkeypatch, tmp_path):
+    monkeypatch.setattr(gallery, "DRAWN", tmp_path)
+    monkeypatch.setattr(gallery, "ROOT", tmp_path)
+    folder = gallery.folder("first", full=False) / "figures"
+    folder.mkdir(parents=True)
+    (folder / "residual.png").touch()
+    section = "\n".join(gallery.page()).partition("## studies/first.toml")[2].partition("## ")[0]
+    assert "Quick form" in section
+    assert "```{figure} ../quick/first/figures/residual.png" in section
+    assert section.count("Residual that the homotopy") == 2
