@@ -10,7 +10,7 @@ compressibility is a small part of what it was: V* − V has the error of the pe
 Fortin & Glowinski 1983).
 
 Newton's steps, all with the factors of the first tangent (`kept_factors`), end when a correction is small beside the
-way gone. Where the flow has a potential it falls at each step (`energy`): at n = 0.05 the residual, made to fall instead,
+way gone. Where the flow has a potential it falls at each step (`energy`): at n = 0.05 a residual made to fall instead
 cuts the steps so short that they end far from the solution. None of this is counted with the work of the method.
 """
 
