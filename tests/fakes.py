@@ -107,7 +107,7 @@ class Grid(Discretizer):
 class Dense(LinearSolver):
     """Stands in for the default linear solver."""
 
-    kind: Literal["superlu"] = "superlu"
+    kind: Literal["auto"] = "auto"
 
     def factorize(self, matrix: Any, previous: Factors | None = None) -> Factors:
         class Same(Factors):

@@ -309,6 +309,6 @@ def test_the_installed_registry_is_loaded_once():
 
 def test_the_default_kind_of_a_contract_is_installed():
     defaults = {noun: contract.default_kind for noun, contract in CONTRACTS.items() if contract.default_kind}
-    assert defaults == {"linear": "superlu", "operator": "tangent", "predictor": "previous"}
+    assert defaults == {"linear": "auto", "operator": "tangent", "predictor": "previous"}
     for noun, kind in defaults.items():
         assert kind in load_registry().classes(noun)

@@ -625,6 +625,7 @@ def test_a_small_study_of_real_marches() -> None:
         "scene": {"kind": "stirring-tool", "nodes": {"kind": "rings", "spacing": 1.0}},
         "law": {"kind": "power-law", "index": 0.5},
         "discretizer": {"kind": "delaunay"},
+        "linear": {"kind": "superlu"},
         "solver": {"kind": "newton"},
         "start": {"values": [1.0]},
         "timing": {"calibrate": True, "clock": "processor"},

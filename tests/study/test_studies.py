@@ -69,7 +69,7 @@ class TestCases:
 
     def test_sections_with_a_default_may_be_left_out_or_have_no_kind(self, tmp_path):
         case = read(tmp_path, ("[solver]", "[linear]\nrefinement = 2\n[refresh]\nm = 9\n[solver]")).cases[0]
-        assert (case.parts.linear.kind_name(), case.parts.linear.refinement) == ("superlu", 2)
+        assert (case.parts.linear.kind_name(), case.parts.linear.refinement) == ("auto", 2)
         assert (case.parts.refresh.kind_name(), case.parameters["refresh.m"]) == ("every-m", 9)
         assert case.parts.start.solver.kind_name() == "newton"
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections import Counter
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -164,7 +164,7 @@ def status_of_folder(folder: Path) -> FolderStatus:
     return FolderStatus(
         described,
         len(planned),
-        Counter(str(entry.measured["status"]) for entry in entries),
+        _endings(entries),
         {
             entry.identity.case: str(entry.measured.get("message"))
             for entry in entries
@@ -174,6 +174,13 @@ def status_of_folder(folder: Path) -> FolderStatus:
         len(set(planned) - done - set(running)),
         len(set(names) - set(planned)),
     )
+
+
+def _endings(entries: Sequence[Entry]) -> dict[str, int]:
+    """How many cases have ended with which status, in the order of `Status`, then of the alphabet."""
+    found = Counter(str(entry.measured["status"]) for entry in entries)
+    known = [status.word for status in Status if status.word in found]
+    return {word: found[word] for word in (*known, *sorted(found.keys() - known))}
 
 
 def shown_of(study: Study, entries: Iterable[Entry]) -> str:
