@@ -29,7 +29,7 @@ from nlsolve.running.store.store import Store
 from nlsolve.running.timing.exclusive import CountingTurns, ExclusiveTurns
 from nlsolve.running.turns import Turns
 from nlsolve.show.expectations import Finding, judged
-from nlsolve.show.figures import FigureError, draw, save
+from nlsolve.show.figures import FigureError, write
 from nlsolve.show.tables import PREAMBLE, PREAMBLE_FILE, Provenance, Table, build, built
 from nlsolve.study.study import Study
 from nlsolve.study.timing import Timing
@@ -249,7 +249,7 @@ def _show(store: Store, study: Study, frames: Frames) -> tuple[str, ...]:
         for spec in study.figures:
             caption = spec.caption or spec.name
             try:
-                save(draw(spec, frames.runs, frames.steps, frames.fields), store.folder / "figures", spec.name)
+                notes += write(spec, frames, store.folder / "figures").notes
                 caption = " ".join((caption, *spec.on_seconds(frames.runs)))
             except FigureError as error:
                 notes.append(str(error))

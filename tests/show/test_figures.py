@@ -173,7 +173,7 @@ def test_legend_is_inside_the_paper_and_off_the_axes(frames: dict[str, pd.DataFr
     assert figure.bbox.x0 <= box.x0
     assert box.x1 <= figure.bbox.x1
     assert box.y0 >= figure.axes[0].get_window_extent().y1
-    styles = {(line.get_color(), line.get_linestyle()) for line in figure.axes[0].lines}
+    styles = {(line.get_color(), str(line._unscaled_dash_pattern)) for line in figure.axes[0].lines}  # type: ignore[attr-defined]
     assert len(styles) == 12
 
 
