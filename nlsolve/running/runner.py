@@ -61,6 +61,11 @@ class Results:
         return int(self.runs["status"].isin([status.word for status in FAILED]).sum())
 
     @property
+    def frames(self) -> Frames:
+        """The three frames."""
+        return Frames(self.runs, self.steps, self.fields)
+
+    @property
     def findings(self) -> tuple[Finding, ...]:
         """What the study expects to find, and whether these runs bear it out; nothing until all cases are finished."""
         if len(self.runs) < len(self.study.cases):
@@ -173,7 +178,7 @@ def _taken(turns: Turns, engine: Engine, tell: Listener) -> dict[str, Part]:
 def load(folder: str | Path) -> Results:
     """The results in a folder, of whatever is finished of the study that it was last used for.
 
-    No study file is needed: the `study` of the results has tables, but no cases and no figures. Where the folder's
+    No study file is needed: the `study` of the results has tables and figures, but no cases. Where the folder's
     description of its study is damaged, all its cases are given that one source has computed.
 
     Raises StoreError when there are none.

@@ -103,8 +103,8 @@ def write(spec: BaseFigure, frames: Frames, folder: Path) -> Written:
     figure, told = drawn(spec, frames)
     try:
         paths = save(figure, folder, spec.name, spec)
-    except plotting.LatexError as error:
-        raise spec.refuse(f"TeX cannot set a text of it for PGF: {str(error).splitlines()[0]}") from error
+    except (ValueError, plotting.LatexError) as error:  # what matplotlib and TeX raise
+        raise spec.refuse(f"mathematics in one of its texts cannot be set: {' '.join(str(error).split())}") from error
     if spec.data is not False:
         paths.append(folder / f"{spec.name}.csv")
         told.to_csv(paths[-1], index=False)

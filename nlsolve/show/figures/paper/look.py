@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import re
-from typing import Annotated, Any, ClassVar, Literal, Self
+from typing import Annotated, Any, ClassVar, Literal, Self, get_args
 
-from pydantic import BeforeValidator, Field
+from pydantic import BeforeValidator, Field, WithJsonSchema
 
 from nlsolve.contracts.component import Component
 
@@ -50,6 +50,9 @@ Formats = Annotated[
     tuple[Format, ...],
     BeforeValidator(lambda value: (value,) if isinstance(value, str) else value),
     Field(min_length=1),
+    WithJsonSchema(
+        {"anyOf": [{"enum": list(get_args(Format))}, {"type": "array", "items": {"enum": list(get_args(Format))}}]}
+    ),
 ]
 
 
@@ -69,9 +72,7 @@ class Look(Component):
     font_size: float | None = Field(
         None, ge=4, le=24, description=f"size of titles and labels [pt]; absent: {FONT_SIZE:g}, other letters by it"
     )
-    formats: Formats | None = Field(
-        None, description='format or formats of the picture, of png, pdf, svg and pgf; absent: ["png", "pdf"]'
-    )
+    formats: Formats | None = Field(None, description='format or formats of the picture; absent: ["png", "pdf"]')
     resolution: int | None = Field(None, ge=50, le=2400, description=f"dots per inch of PNG; absent: {RESOLUTION}")
     data: bool | None = Field(
         None, description="whether NAME.csv with what is drawn is written beside the picture; absent: true"
@@ -79,8 +80,12 @@ class Look(Component):
 
     def under(self, general: Look) -> Self:
         """This look, with what it does not say as the general one says."""
-        absent = {name: getattr(general, name) for name in Look.model_fields if getattr(self, name) is None}
-        return self.with_(**absent)
+        return self.with_(**{name: value for name, value in general.said.items() if getattr(self, name) is None})
+
+    @property
+    def said(self) -> dict[str, Any]:
+        """What is said of the look, by key."""
+        return {name: value for name in Look.model_fields if (value := getattr(self, name)) is not None}
 
     def wide(self, usual: float) -> float:
         """The width [inch]: the declared one, or the usual one of the kind."""

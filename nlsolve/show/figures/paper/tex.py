@@ -17,7 +17,7 @@ PREAMBLE = r"""% What figures in PGF need: \input{preamble} before \begin{docume
 \providecommand{\mathdefault}[1]{#1}
 """
 
-MATHEMATICS = re.compile(r"\$(?:[^$\\]|\\.)*\$")
+MATHEMATICS = re.compile(r"(?<!\\)\$(?:[^$\\]|\\.)*\$")
 
 
 def engine() -> str | None:
@@ -30,10 +30,14 @@ def in_tex(text: str) -> str:
     if "\n" in text:
         return "\n".join(map(in_tex, text.split("\n")))
     if text.replace(r"\$", "").count("$") % 2:  # a dollar without its partner is a letter
-        return escaped(text)
+        return _words(text)
     parts = MATHEMATICS.split(text)
     inside = [_mathematics(part) for part in MATHEMATICS.findall(text)] + [""]
-    return "".join(escaped(part.replace(r"\$", "$")) + math for part, math in zip(parts, inside, strict=True))
+    return "".join(_words(part.replace(r"\$", "$")) + math for part, math in zip(parts, inside, strict=True))
+
+
+def _words(text: str) -> str:
+    return escaped(text).replace(r"\$", r"\textdollar{}")  # matplotlib takes \$ for a dollar that it has to escape
 
 
 def _mathematics(text: str) -> str:
