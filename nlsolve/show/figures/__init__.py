@@ -24,9 +24,9 @@ from nlsolve.show.figures.map import MapFigure
 from nlsolve.show.figures.nodes.animation import animate
 from nlsolve.show.figures.nodes.cloud import CloudFigure
 from nlsolve.show.figures.nodes.field import FieldFigure
-from nlsolve.show.figures.nodes.panels import PanelsFigure
+from nlsolve.show.figures.nodes.panels import ANIMATIONS, PanelsFigure
 from nlsolve.show.figures.nodes.profile import ProfileFigure
-from nlsolve.show.figures.paper.files import missing, save
+from nlsolve.show.figures.paper.files import as_png, missing, save
 from nlsolve.show.figures.paper.look import COLUMN, Look
 from nlsolve.show.figures.solved import DataFigure, PerformanceFigure
 from nlsolve.show.figures.style import FONTS, style_of
@@ -71,10 +71,21 @@ FigureSpec = Annotated[
 
 @dataclass(frozen=True)
 class Written:
-    """The files of a figure, and a sentence for each that was asked for and cannot be written on this machine."""
+    """The files of a figure, and a sentence for each that was asked for and cannot be written on this machine.
+
+    png : the picture as PNG, whether or not it is one of the files. inches : its width on paper.
+    """
 
     paths: tuple[Path, ...]
     notes: tuple[str, ...]
+    png: bytes
+    inches: float
+
+    @property
+    def moving(self) -> tuple[bytes, str] | None:
+        """The animation and its format; None without one."""
+        form = next((path for path in self.paths if path.suffix[1:] in ANIMATIONS), None)
+        return None if form is None else (form.read_bytes(), form.suffix[1:])
 
 
 def draw(spec: BaseFigure, runs: pd.DataFrame, steps: pd.DataFrame, fields: pd.DataFrame) -> plotting.Figure:
@@ -103,6 +114,7 @@ def write(spec: BaseFigure, frames: Frames, folder: Path) -> Written:
     figure, told = drawn(spec, frames)
     try:
         paths = save(figure, folder, spec.name, spec)
+        png = as_png(figure, spec)
     except (ValueError, plotting.LatexError) as error:  # what matplotlib and TeX raise
         raise spec.refuse(f"mathematics in one of its texts cannot be set: {' '.join(str(error).split())}") from error
     if spec.data is not False:
@@ -114,4 +126,5 @@ def write(spec: BaseFigure, frames: Frames, folder: Path) -> Written:
         if not missing(spec.animation):
             paths.append(folder / f"{spec.name}.{spec.animation}")
             animate(spec, frames, paths[-1])
-    return Written(tuple(paths), tuple(str(spec.refuse(missing(form))) for form in asked if missing(form)))
+    notes = tuple(str(spec.refuse(missing(form))) for form in asked if missing(form))
+    return Written(tuple(paths), notes, png, figure.get_figwidth())

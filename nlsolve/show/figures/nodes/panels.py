@@ -5,7 +5,7 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Annotated, Literal
+from typing import Annotated, Literal, get_args
 
 import numpy as np
 import pandas as pd
@@ -19,6 +19,8 @@ from nlsolve.show.figures.paper.look import COLUMN, MILLIMETRE, PAGE
 from nlsolve.show.figures.style import axis_label, bracketed, headed, join
 
 MOST_PANELS, MOST_COLUMNS = 12, 6
+Animation = Literal["gif", "apng", "mp4"]
+ANIMATIONS: tuple[Animation, ...] = get_args(Animation)
 Window = tuple[float, float, float, float]
 
 
@@ -61,7 +63,7 @@ class PanelsFigure(NodesFigure):
     times: tuple[Annotated[float, Field(ge=0)], ...] = Field(
         (), description="a frame strip: times in place of `time`, a panel each [s]"
     )
-    animation: Literal["gif", "apng", "mp4"] | None = Field(
+    animation: Animation | None = Field(
         None, description="also a moving picture of all recorded times, NAME.gif, NAME.apng or NAME.mp4 (needs ffmpeg)"
     )
     frames_per_second: int = Field(5, gt=0, le=60, description="of the animation")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
@@ -35,6 +36,14 @@ def save(figure: plotting.Figure, folder: Path, name: str, look: Look | None = N
     if "pgf" in (look.formats or ()) and not missing("pgf"):
         (folder / PREAMBLE_FILE).write_text(PREAMBLE, encoding="utf-8")
     return paths
+
+
+def as_png(figure: plotting.Figure, look: Look) -> bytes:
+    """The picture of a figure for a screen."""
+    content = BytesIO()
+    with plotting.rc_context(style_of(look)):
+        figure.savefig(content, format="png", dpi=RESOLUTION)
+    return content.getvalue()
 
 
 def missing(form: str) -> str:
