@@ -73,13 +73,24 @@ FigureSpec = Annotated[
 class Written:
     """The files of a figure, and a sentence for each that was asked for and cannot be written on this machine.
 
-    png : the picture as PNG, whether or not it is one of the files. inches : its width on paper.
+    figure : what was drawn, as the look says.
     """
 
     paths: tuple[Path, ...]
     notes: tuple[str, ...]
-    png: bytes
-    inches: float
+    figure: plotting.Figure
+    look: Look
+
+    @property
+    def png(self) -> bytes:
+        """The picture for a screen, whether or not PNG is one of its formats."""
+        path = next((path for path in self.paths if path.suffix == ".png"), None)
+        return path.read_bytes() if path and self.look.resolution is None else as_png(self.figure, self.look)
+
+    @property
+    def inches(self) -> float:
+        """Its width on paper."""
+        return self.figure.get_figwidth()
 
     @property
     def moving(self) -> tuple[bytes, str] | None:
@@ -114,7 +125,6 @@ def write(spec: BaseFigure, frames: Frames, folder: Path) -> Written:
     figure, told = drawn(spec, frames)
     try:
         paths = save(figure, folder, spec.name, spec)
-        png = as_png(figure, spec)
     except (ValueError, plotting.LatexError) as error:  # what matplotlib and TeX raise
         raise spec.refuse(f"mathematics in one of its texts cannot be set: {' '.join(str(error).split())}") from error
     if spec.data is not False:
@@ -127,4 +137,4 @@ def write(spec: BaseFigure, frames: Frames, folder: Path) -> Written:
             paths.append(folder / f"{spec.name}.{spec.animation}")
             animate(spec, frames, paths[-1])
     notes = tuple(str(spec.refuse(missing(form))) for form in asked if missing(form))
-    return Written(tuple(paths), notes, png, figure.get_figwidth())
+    return Written(tuple(paths), notes, figure, spec)

@@ -15,13 +15,14 @@ from nlsolve.results.frames import rows_of
 from nlsolve.results.verdicts import AT_A_SOLUTION, Run, doubt, number, status_of
 
 MOST_ROWS = 200
+TOTAL = {"seconds": "inside the method"}
 PARTS = {
     "seconds_factorization": "factorising",
     "seconds_triangular_solve": "triangular solves",
     "seconds_jacobian": "Jacobians",
     "seconds_residual": "residuals",
     "seconds_series": "series coefficients",
-    "seconds_own": "work of the methods themselves",
+    "seconds_own": "work of the method itself",
 }
 """Columns of `runs` that add up to `seconds`, in words."""
 BESIDE = {
@@ -30,6 +31,7 @@ BESIDE = {
     "seconds_estimate": "estimates of adaptive nodes",
 }
 """What is not in `seconds`."""
+ALL = {"seconds_all": "everything"}
 AUDIT = "audit."
 NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)(e[+-]?\d+)?(?=\s|$)", re.IGNORECASE)
 """What is sorted as a number, see page.js."""
@@ -88,7 +90,7 @@ def audits(runs: pd.DataFrame) -> Sheet:
 
 def cost(runs: pd.DataFrame, names: Sequence[str]) -> Sheet:
     """The seconds of each case by part; of very many cases the dearest ones."""
-    timed = ["seconds", *PARTS, *BESIDE, "seconds_all"]
+    timed = TOTAL | PARTS | BESIDE | ALL
     columns = [name for name in timed if name in runs and pd.to_numeric(runs[name], errors="coerce").gt(0).any()]
     if not columns:
         return Sheet((), ())
@@ -96,9 +98,9 @@ def cost(runs: pd.DataFrame, names: Sequence[str]) -> Sheet:
     dearest = sorted(range(len(members)), key=lambda place: -_or_zero(members[place].get(columns[0])))[:MOST_ROWS]
     chosen = [members[place] for place in sorted(dearest)]
     told = [*columns, *(name for name in ("lane",) if name in runs)]
-    rows = tuple((*_case(run, names), *(in_words(run[name]) for name in told)) for run in chosen)
-    headings = (f"{name} [{RUNS[name].unit}]" if RUNS[name].unit else name for name in told)
-    meanings = ("", *("" for _ in names), *(RUNS[name].meaning for name in told))
+    rows = tuple((*_case(run, names), *(_seconds(run[name]) for name in told)) for run in chosen)
+    headings = (f"{timed[name]} [{RUNS[name].unit}]" if name in timed else name for name in told)
+    meanings = ("", *("" for _ in names), *(f"column {name}: {RUNS[name].meaning}" for name in told))
     note = f"These are the {MOST_ROWS} dearest of {len(members)} cases; runs.csv has all." * (len(members) > MOST_ROWS)
     return Sheet(("case", *names, *headings), rows, meanings, note)
 
@@ -123,6 +125,10 @@ def in_words(value: Any) -> str:
     if value is None or (isinstance(value, float) and value != value):
         return ""
     return f"{value:.4g}" if isinstance(value, float) else str(value)
+
+
+def _seconds(value: Any) -> str:
+    return f"{value:.3g}" if isinstance(value, float) and value == value else in_words(value)
 
 
 def _case(run: Run, names: Sequence[str]) -> tuple[str, ...]:

@@ -191,13 +191,13 @@ def test_doubts_and_audits_are_in_words(tmp_path: Path) -> None:
 
 def test_cost_is_told_by_part_and_by_case(tmp_path: Path) -> None:
     page = write_report(tmp_path, "?", {}, [], TIMED).read_text(encoding="utf-8")
-    sentence = "The methods took 5 s in all: 70 % factorising, 30 % work of the methods themselves. "
+    sentence = "The methods took 5 s in all: 70 % factorising, 30 % work of the method itself. "
     assert sentence + "Beside these: 0.25 s first states." in page
     headings, rows = table(page, "cost")
-    parts = ["seconds [s]", "seconds_factorization [s]", "seconds_own [s]", "seconds_start [s]", "lane"]
+    parts = ["inside the method [s]", "factorising [s]", "work of the method itself [s]", "first states [s]", "lane"]
     assert headings == ["case", "solver.order", "solver.kind", *parts]
     assert rows[0] == ["a1", "20", "anm", "4", "3", "1", "0.25", "alone"]
-    assert f'title="{RESULTS["seconds"].meaning}"' in page
+    assert f'title="column seconds: {RESULTS["seconds"].meaning}"' in page
     assert 'id="cost"' not in write_report(tmp_path, "?", {}, [], RUNS).read_text(encoding="utf-8")
 
 
