@@ -107,7 +107,7 @@ def figure(
         names = [spec.name for spec in results.study.figures]
         if name is not None and name not in names:
             raise StudyError(f"{folder}: there is no figure {name!r}; {did_you_mean(name, names)}")
-        told = list(results.notes)
+        told = [*results.notes, *([] if names else [f"{folder}: its study declares no figures"])]
         for spec in results.study.figures:
             if name in (None, spec.name):
                 try:

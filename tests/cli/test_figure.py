@@ -120,6 +120,12 @@ def test_of_all_figures_those_that_cannot_be_drawn_are_told() -> None:
     assert told.stdout == ""
 
 
+def test_a_study_without_figures(tmp_path: Path) -> None:
+    nlsolve("run", write_study(tmp_path), "--out", "bare")
+    told = nlsolve("figure", "bare")
+    assert (told.exit_code, told.stdout, told.stderr) == (0, "", "bare: its study declares no figures\n")
+
+
 def test_loaded_results_have_the_figures_of_their_study(tmp_path: Path) -> None:
     declared = Study.from_toml(tmp_path / "study.toml").figures
     assert house.load("o").study.figures == declared

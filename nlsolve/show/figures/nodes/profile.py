@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 import pandas as pd
@@ -16,6 +16,18 @@ from nlsolve.show.figures.cases import plain
 from nlsolve.show.figures.nodes.panels import NodesFigure, snapshots_of
 from nlsolve.show.figures.nodes.sections import slice_triangles, triangulate
 from nlsolve.show.figures.style import axis_label, curve_style, finish, join
+
+EXACT: Any = {
+    "color": "black",
+    "linestyle": (0, (4, 3)),
+    "linewidth": 0.6,
+    "marker": "+",
+    "markersize": 4,
+    "markeredgewidth": 0.6,
+    "markevery": 0.06,
+    "zorder": 3,
+}
+"""The exact solution, told by its crosses from the curves, which have none."""
 
 
 class ProfileFigure(NodesFigure):
@@ -49,7 +61,7 @@ class ProfileFigure(NodesFigure):
         for number, pair in enumerate(exacts):
             label = "" if number else "exact"
             told.append(self._told("exact", *pair))
-            axes.plot(*pair, color="black", linestyle=(0, (4, 3)), linewidth=0.6, zorder=3, label=label)
+            axes.plot(*pair, label=label, **EXACT)
         if exacts and len(snapshots) == 1 and not snapshots[0].label:
             axes.lines[0].set_label(FIELDS[self.value].symbol)
         other = "y" if self.axis == "x" else "x"
