@@ -1,4 +1,4 @@
-"""What the tests of typeset tables need: a document of tables, its engines, and what the log and the page say."""
+"""What the tests of typeset tables and figures need: a document, its engines, and what the log and the page say."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import re
 import shutil
 import subprocess
 import unicodedata
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import pytest
@@ -20,25 +20,33 @@ MOST = 1.0
 OVERFULL = re.compile(r"Overfull \\hbox \((\d+\.\d+)pt too wide\)[^\n]*")
 
 
-def needs(engine: str) -> None:
+TABLES = ("siunitx.sty", "booktabs.sty", "pdflscape.sty")
+
+
+def needs(engine: str, packages: Sequence[str] = TABLES) -> None:
     """Skip the test where an engine of TeX, or a package of it, is not installed."""
     if shutil.which(engine) is None:
         pytest.skip(f"{engine} is not installed")
-    for name in ("siunitx.sty", "booktabs.sty", "pdflscape.sty"):
+    for name in packages:
         if not subprocess.run(["kpsewhich", name], capture_output=True, text=True).stdout.strip():
             pytest.skip(f"{name} is not installed for {engine}")
 
 
 def typeset(folder: Path, texts: Mapping[str, str], engine: str, options: str = "") -> Path:
-    """The document of some tables, a page each, by name of their files. Fails where TeX complains of anything.
-
-    An overfull box of more than a point is a complaint, and so is a letter that no font has.
-    """
+    """The document of some tables, a page each, by name of their files. Fails where TeX complains of anything."""
     folder.mkdir(parents=True, exist_ok=True)
     (folder / PREAMBLE_FILE).write_text(PREAMBLE, encoding="utf-8")
     for name, text in texts.items():
         (folder / f"{name}.tex").write_text(text, encoding="utf-8")
     body = "\n".join(rf"\input{{{name}.tex}}\clearpage" for name in texts)
+    return compiled(folder, body, engine, options)
+
+
+def compiled(folder: Path, body: str, engine: str, options: str = "") -> Path:
+    """The document with this body, and with preamble.tex of the folder. Fails where TeX complains of anything.
+
+    An overfull box of more than a point is a complaint, and so is a letter that no font has.
+    """
     document = rf"\documentclass{options}{{article}}\input{{preamble}}\begin{{document}}{body}\end{{document}}"
     (folder / "document.tex").write_text(document, encoding="utf-8")
     ran = subprocess.run(
@@ -71,3 +79,8 @@ def letters_of(text: str) -> str:
     for letter, meant in ALIKE.items():
         text = text.replace(letter, meant)
     return "".join(letter for letter in unicodedata.normalize("NFKD", text) if not letter.isspace())
+
+
+def as_letters(text: str, engine: str) -> str:
+    """What is read of a text on the page: pdflatex draws an underscore as a line, lualatex reads ‖ as a k."""
+    return letters_of({"pdflatex": text.replace("_", ""), "lualatex": text.replace("‖", "k")}.get(engine, text))

@@ -1,4 +1,4 @@
-"""The commands on results folders: table, status, merge, gc, export."""
+"""The commands on results folders: table, figure, status, merge, gc, export."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
+from pydantic import ValidationError
 
 from nlsolve.cli.endings import ExitCode, ending
 from nlsolve.cli.options import (
@@ -21,11 +22,13 @@ from nlsolve.cli.options import (
     default_folder,
 )
 from nlsolve.cli.printing import count, print_endings, print_included, print_table, say
-from nlsolve.registry.problems import StudyError, did_you_mean
+from nlsolve.registry.problems import StudyError, did_you_mean, problems_in
 from nlsolve.results.parameters import differing_parameters
 from nlsolve.running.packing.pack import export as packed
+from nlsolve.running.runner import load
 from nlsolve.running.store.reading import FolderStatus, read_tables, status_of_folder
 from nlsolve.running.store.upkeep import merge_folders, remove, superfluous
+from nlsolve.show.figures import FigureError, Look, write
 from nlsolve.show.tables import built, included_tables
 
 folders = typer.Typer()
@@ -76,6 +79,63 @@ def table(
     if not described.tables:
         shared = [name for name in differing_parameters(runs) if runs[name].notna().all()]
         print_endings(described.question, runs, shared)
+
+
+@folders.command()
+def figure(
+    folder: Folder,
+    name: Annotated[str | None, typer.Argument(help="one declared figure; default: all")] = None,
+    width: Annotated[
+        str | None, typer.Option(help="width on paper: single, double, or a length such as 84mm, 3.3in or 240pt")
+    ] = None,
+    font: Annotated[str | None, typer.Option(help="serif, sans-serif, or an installed font")] = None,
+    font_size: Annotated[float | None, typer.Option(help="size of titles and labels in points")] = None,
+    formats: Annotated[
+        list[str] | None, typer.Option("--format", help="png, pdf, svg or pgf; may be given several times")
+    ] = None,
+    resolution: Annotated[int | None, typer.Option(help="dots per inch of PNG")] = None,
+    to: Annotated[Path | None, typer.Option(metavar="FOLDER", help="where to; default: figures in DIR")] = None,
+) -> None:
+    """Draw the declared figures of a results folder again, of whatever is finished, perhaps wider or in other formats.
+
+    Nothing is run. What no option says is as the study says.
+    """
+    given = {"width": width, "font": font, "font_size": font_size, "formats": formats, "resolution": resolution}
+    with ending():
+        look = _look({key: value for key, value in given.items() if value is not None})
+        results = load(folder)
+        names = [spec.name for spec in results.study.figures]
+        if name is not None and name not in names:
+            raise StudyError(f"{folder}: there is no figure {name!r}; {did_you_mean(name, names)}")
+        told = [*results.notes, *([] if names else [f"{folder}: its study declares no figures"])]
+        for spec in results.study.figures:
+            if name in (None, spec.name):
+                try:
+                    written = write(spec.with_(**look.said), results.frames, to or folder / "figures")
+                except FigureError as error:
+                    if name is not None:
+                        raise StudyError(str(error)) from error
+                    told.append(str(error))
+                    continue
+                told += written.notes
+                for path in written.paths:
+                    typer.echo(str(path))
+    for sentence in told:
+        say(sentence)
+
+
+def _look(given: dict[str, object]) -> Look:
+    """A look by the options of a command. Raises StudyError for a value that it cannot have."""
+    try:
+        return Look.model_validate(given)
+    except ValidationError as error:
+        wrong = problems_in(error, Look, given)
+        options = {"formats": "format", "font_size": "font-size"}
+        sentences = [
+            f"--{options.get(str(problem.place[0]), problem.place[0])} {problem.value}: {problem.expected}"
+            for problem in wrong
+        ]
+        raise StudyError(*sentences) from error
 
 
 @folders.command()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import shlex
 import time
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass, replace
 from datetime import date
@@ -29,7 +29,7 @@ from nlsolve.running.store.store import Store
 from nlsolve.running.timing.exclusive import CountingTurns, ExclusiveTurns
 from nlsolve.running.turns import Turns
 from nlsolve.show.expectations import Finding, judged
-from nlsolve.show.figures import FigureError, draw, save
+from nlsolve.show.figures import FigureError, write
 from nlsolve.show.tables import PREAMBLE, PREAMBLE_FILE, Provenance, Table, build, built
 from nlsolve.study.study import Study
 from nlsolve.study.timing import Timing
@@ -59,6 +59,11 @@ class Results:
     def crashed(self) -> int:
         """How many cases stopped on an error in the program or in a plugin, or were stopped at a limit."""
         return int(self.runs["status"].isin([status.word for status in FAILED]).sum())
+
+    @property
+    def frames(self) -> Frames:
+        """The three frames."""
+        return Frames(self.runs, self.steps, self.fields)
 
     @property
     def findings(self) -> tuple[Finding, ...]:
@@ -146,7 +151,7 @@ def run(
     notes = (*told, *_unfinished(len(frames.runs), len(study.cases), bool(study.expectations)))
     if store is None:
         return Results(study, frames.runs, frames.steps, frames.fields, notes=notes)
-    notes += _show(store, study, frames)
+    notes += _show(store, study, frames, notes)
     store.mark_shown(notes)
     return Results(study, frames.runs, frames.steps, frames.fields, store.folder, notes)
 
@@ -173,7 +178,7 @@ def _taken(turns: Turns, engine: Engine, tell: Listener) -> dict[str, Part]:
 def load(folder: str | Path) -> Results:
     """The results in a folder, of whatever is finished of the study that it was last used for.
 
-    No study file is needed: the `study` of the results has tables, but no cases and no figures. Where the folder's
+    No study file is needed: the `study` of the results has tables and figures, but no cases. Where the folder's
     description of its study is damaged, all its cases are given that one source has computed.
 
     Raises StoreError when there are none.
@@ -225,8 +230,11 @@ def _unfinished(finished: int, planned: int, judges: bool = False) -> tuple[str,
     return (f"{finished} of {planned} cases are finished{later}",) if finished < planned else ()
 
 
-def _show(store: Store, study: Study, frames: Frames) -> tuple[str, ...]:
-    """Write tables, figures and the report. Returns a sentence for each that cannot be shown; the results stay."""
+def _show(store: Store, study: Study, frames: Frames, remarks: Sequence[str]) -> tuple[str, ...]:
+    """Write tables, figures and the report. Returns a sentence for each that cannot be shown; the results stay.
+
+    remarks : what is said of the results as a whole.
+    """
     report = import_module("nlsolve.show.report")  # loads jinja2, which a run with nothing to show does without
     tables, notes = built(study.tables, frames.runs)
     command = f"{study.command} --out {shlex.quote(str(store.folder))}" if study.command else ""
@@ -240,24 +248,39 @@ def _show(store: Store, study: Study, frames: Frames) -> tuple[str, ...]:
             store.write_text(f"tables/{table.spec.name}{ending}", text)
         frames_shown = {
             title if title not in shown else f"{title} ({table.spec.name})": frame
-            for title, frame in table.frames().items()
+            for title, frame in table.flat().items()
         }
         shown |= frames_shown
         beneath[list(frames_shown)[-1]] = table.notes
-    captions: list[tuple[str, str]] = []
+    pictures: list[Any] = []
     with store.writing():
         for spec in study.figures:
             caption = spec.caption or spec.name
             try:
-                save(draw(spec, frames.runs, frames.steps, frames.fields), store.folder / "figures", spec.name)
-                caption = " ".join((caption, *spec.on_seconds(frames.runs)))
+                written = write(spec, frames, store.folder / "figures")
             except FigureError as error:
                 notes.append(str(error))
-            captions.append((spec.name, caption))
+                pictures.append(report.Picture(spec.name, caption))
+                continue
+            notes += written.notes
+            caption = " ".join((caption, *spec.on_seconds(frames.runs)))
+            files = tuple(f"figures/{path.name}" for path in written.paths)
+            pictures.append(report.Picture(spec.name, caption, written.png, written.inches, written.moving, files))
         environments = environments_of(store.parts, frames.runs)
         left_out = [(excluded.label, excluded.reason) for excluded in study.excluded]
         findings = Results(study, frames.runs, frames.steps, frames.fields).findings
         report.write_report(
-            store.folder, study.question, shown, captions, frames.runs, environments, findings, left_out, beneath
+            store.folder,
+            study.question,
+            shown,
+            pictures,
+            frames.runs,
+            environments,
+            findings,
+            left_out,
+            beneath,
+            provenance,
+            (*remarks, *notes),
+            list(dict.fromkeys(name for case in study.cases for name in case.swept)),
         )
     return tuple(notes)

@@ -6,16 +6,21 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from matplotlib import colormaps, rc_context
+    from matplotlib import colormaps, rc_context, rcParams
+    from matplotlib.animation import AbstractMovieWriter, FFMpegWriter, PillowWriter
     from matplotlib.axes import Axes
+    from matplotlib.backends.backend_pgf import LatexError
     from matplotlib.cm import ScalarMappable
     from matplotlib.collections import LineCollection
     from matplotlib.colors import LogNorm
     from matplotlib.figure import Figure
+    from matplotlib.font_manager import fontManager
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch, Polygon, Rectangle
+    from matplotlib.text import Text
     from matplotlib.ticker import (
         FixedLocator,
+        Formatter,
         FuncFormatter,
         LogFormatter,
         LogLocator,
@@ -27,16 +32,24 @@ if TYPE_CHECKING:
 _HOME = {
     "colormaps": "matplotlib",
     "rc_context": "matplotlib",
+    "rcParams": "matplotlib",
+    "AbstractMovieWriter": "matplotlib.animation",
+    "FFMpegWriter": "matplotlib.animation",
+    "PillowWriter": "matplotlib.animation",
+    "LatexError": "matplotlib.backends.backend_pgf",
     "Axes": "matplotlib.axes",
     "ScalarMappable": "matplotlib.cm",
     "LineCollection": "matplotlib.collections",
     "LogNorm": "matplotlib.colors",
     "Figure": "matplotlib.figure",
+    "fontManager": "matplotlib.font_manager",
     "Line2D": "matplotlib.lines",
     "Patch": "matplotlib.patches",
     "Polygon": "matplotlib.patches",
     "Rectangle": "matplotlib.patches",
+    "Text": "matplotlib.text",
     "FixedLocator": "matplotlib.ticker",
+    "Formatter": "matplotlib.ticker",
     "FuncFormatter": "matplotlib.ticker",
     "LogFormatter": "matplotlib.ticker",
     "LogLocator": "matplotlib.ticker",
@@ -46,10 +59,14 @@ _HOME = {
 }
 
 __all__ = [
+    "AbstractMovieWriter",
     "Axes",
+    "FFMpegWriter",
     "Figure",
     "FixedLocator",
+    "Formatter",
     "FuncFormatter",
+    "LatexError",
     "Line2D",
     "LineCollection",
     "LogFormatter",
@@ -58,11 +75,15 @@ __all__ = [
     "MaxNLocator",
     "NullLocator",
     "Patch",
+    "PillowWriter",
     "Polygon",
     "Rectangle",
     "ScalarMappable",
+    "Text",
     "Triangulation",
     "colormaps",
+    "fontManager",
+    "rcParams",
     "rc_context",
 ]
 

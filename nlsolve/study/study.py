@@ -18,7 +18,7 @@ from nlsolve.results.columns import RUNS, is_measured, no_such_column
 from nlsolve.results.parameters import VARIANT, names_settings
 from nlsolve.results.reference_error import REFERENCE
 from nlsolve.show.expectations import Expectation
-from nlsolve.show.figures import BaseFigure, FigureSpec
+from nlsolve.show.figures import BaseFigure, FigureSpec, Look
 from nlsolve.show.tables import PREAMBLE_FILE, TableSpec, check
 from nlsolve.study.case import Case, Composer, Invalid
 from nlsolve.study.documents import EXTENDS, PLUGINS, command_of, read_document
@@ -48,6 +48,7 @@ class Frame(BaseModel):
     )
     table: tuple[TableSpec, ...] = Field((), description="tables of the results")
     figure: tuple[FigureSpec, ...] = Field((), description="figures of the results")
+    figures: Look = Field(Look(), description="width, fonts and files of all figures that say nothing else themselves")
     expect: tuple[Expectation, ...] = Field(
         (), description="findings that the study asserts; exit code 3 of `nlsolve run` says that one does not hold"
     )
@@ -63,6 +64,7 @@ class Study:
 
     has_quick : whether the study has a [quick] section, which `quick=True` and --quick apply.
     plugins : the files of plugins without installation whose components its cases may have.
+    figures : the declared figures, what they do not say of their look as `[figures]` says.
     excluded : the cases that the study leaves out.
     command : what runs it from the command line; empty for a study that is not in a file.
     expectations : what the study asserts of its results; of a quick study, what its [quick] section asserts.
@@ -197,7 +199,7 @@ class _Builder:
             frame.question,
             cases,
             tuple(tables),
-            frame.figure,
+            tuple(figure.under(frame.figures) for figure in frame.figure),
             has_quick=bool(frame.quick),
             timing=frame.timing,
             plugins=self.composer.registry.files,

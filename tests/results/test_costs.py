@@ -30,10 +30,11 @@ from nlsolve.results.costs.cost_prediction import UNITS, with_predictions
 from nlsolve.results.costs.crossover import OTHER, SAME, TIE, Crossover
 from nlsolve.results.costs.lower_envelope import at_best, lower_envelope, under, wins
 from nlsolve.results.costs.unit_costs import COUNTS, UnitCosts
+from nlsolve.results.frames import Frames
 from nlsolve.running.forecast import forecast
 from nlsolve.running.runner import run as run_study
 from nlsolve.running.timing.calibration import ORDER, calibrate, measure
-from nlsolve.show.figures import BaseFigure, FigureError, FigureSpec, draw
+from nlsolve.show.figures import BaseFigure, FigureError, FigureSpec, draw, drawn
 from nlsolve.show.figures.style import ACCENT
 from nlsolve.show.tables import TableSpec, build
 from nlsolve.solving.simulate import Record
@@ -509,6 +510,17 @@ def test_marks_lie_on_the_lines_of_exact_runs() -> None:
     assert np.array(marks, dtype=float) == pytest.approx(np.array(expected))
     (words,) = [[text.get_text() for text in legend.get_texts()] for legend in figure.legends]
     assert words == [*STRATEGIES, "cheapest by the lines"]
+
+
+def test_the_data_beside_the_picture_has_a_row_a_mark_with_its_line() -> None:
+    runs = told()
+    _, data = drawn(ADAPTER.validate_python({"kind": "crossover", "name": "c"}), Frames(runs, runs, runs))
+    assert len(data) == 2 * 9
+    assert data["cost"].to_numpy() == pytest.approx(data["cost_predicted"].to_numpy())
+    line = data["factorizations"] * data["factor_solve_ratio"] + data["rest"]
+    assert data["cost_predicted"].to_numpy() == pytest.approx(line.to_numpy())
+    assert list(dict.fromkeys(data["strategy"])) == list(STRATEGIES)
+    assert list(dict.fromkeys(data["size"])) == ["nodes 100", "nodes 400"]
 
 
 def test_a_mark_is_off_its_line_by_its_deviation_and_a_lost_cell_is_red() -> None:

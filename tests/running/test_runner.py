@@ -96,7 +96,7 @@ def test_files(tmp_path):
         str(path.relative_to(folder)) for path in folder.rglob("*") if path.is_file() and path.parent.name != "cases"
     }
     tables = {f"tables/branches{ending}" for ending in (".csv", ".md", ".tex")} | {"tables/preamble.tex"}
-    figures = {"figures/range.png", "figures/range.pdf"}
+    figures = {"figures/range.png", "figures/range.pdf", "figures/range.csv"}
     frames = {"runs.parquet", "runs.csv", "steps.parquet", "steps.csv", "fields.parquet"}
     (environment,) = results.runs["environment"].unique()
     assert names == tables | figures | frames | {

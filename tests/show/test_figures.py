@@ -13,93 +13,15 @@ import pytest
 from matplotlib import rcParams
 from matplotlib.axes import Axes
 from matplotlib.colors import BoundaryNorm
-from matplotlib.figure import Figure
 from matplotlib.text import Text
 from matplotlib.tri import TriContourSet
-from pydantic import TypeAdapter, ValidationError
+from pictures import ADAPTER, INNER, legend, picture, snapshot
+from pydantic import ValidationError
 
-from nlsolve.results.columns import FIELDS
-from nlsolve.show.figures import BaseFigure, FigureError, FigureSpec, draw, save
+from nlsolve.show.figures import FigureError, draw, save
 from nlsolve.show.figures.nodes.panels import MOST_PANELS
 from nlsolve.show.figures.nodes.sections import outline, slice_triangles, triangulate
 from nlsolve.show.figures.style import axis_label
-
-ADAPTER: TypeAdapter[BaseFigure] = TypeAdapter(FigureSpec)
-INNER, OUTER, RINGS = 1.5, 6.0, 7
-
-
-def cloud() -> tuple[np.ndarray, np.ndarray]:
-    """A coarse annulus: nodes (N, 2), boundary group of each."""
-    places, groups = [], []
-    for number, radius in enumerate(np.linspace(INNER, OUTER, RINGS)):
-        angles = 2 * np.pi * np.arange(count := int(2 * np.pi * radius / 0.75)) / count
-        places.append(radius * np.stack([np.cos(angles), np.sin(angles)], axis=1))
-        groups += [{0: "tool", RINGS - 1: "plate"}.get(number, "")] * count
-    return np.concatenate(places), np.array(groups)
-
-
-def snapshot(case: str, time: float) -> pd.DataFrame:
-    """Spin field u_θ = 150 (r/1.5)^(-10), 2 % too fast beside its "exact" value, on nodes turned by `time` rad."""
-    start, groups = cloud()
-    turn = np.array([[np.cos(time), -np.sin(time)], [np.sin(time), np.cos(time)]])
-    x, y = (start @ turn.T).T
-    r = np.hypot(x, y)
-    speed = 150 * (r / INNER) ** -10
-    values = {name: np.zeros(len(r)) for name in FIELDS}
-    values |= {
-        "x0": start[:, 0],
-        "y0": start[:, 1],
-        "x": x,
-        "y": y,
-        "exact_u": -speed * y / r,
-        "exact_v": speed * x / r,
-        "marker_x": np.full(len(r), np.nan),
-        "marker_y": np.full(len(r), np.nan),
-    }
-    values |= {"u": 1.02 * values["exact_u"], "v": 1.02 * values["exact_v"], "rate": 11 * speed / r / np.sqrt(3)}
-    return pd.DataFrame(values | {"case": case, "time": time, "node": np.arange(len(r)), "boundary": groups})
-
-
-@pytest.fixture(scope="module")
-def frames() -> dict[str, pd.DataFrame]:
-    """Four cases of 60 increments; the last diverged and left no fields."""
-    cases = [
-        ("a", "anm", 10.0, 1e-6),
-        ("b", "anm", 20.0, 1e-6),
-        ("c", "anm", 20.0, 1e-8),
-        ("d", "newton", np.nan, np.nan),
-    ]
-    runs = pd.DataFrame(cases, columns=["case", "solver.kind", "solver.order", "solver.tolerance"])
-    runs["status"] = ["converged"] * 3 + ["diverged"]
-    runs["tangents"] = [208, 88, 94, 2252]
-    runs["velocity_error"] = np.nan
-    runs["time.increment"] = 0.01
-    time = np.repeat(np.arange(1, 61) * 0.01, 2)
-    steps = [
-        pd.DataFrame(
-            {
-                "case": case,
-                "time": time,
-                "step": np.tile([0, 1], 60),
-                "accepted": np.tile([False, True], 60),
-                "range": np.nan if kind == "newton" else 1 + order / 20 * (time * 7 % 1),
-                "residual_norm": 1e-8 * (1 + time),
-                "probe_u": np.cos(time),
-                "probe_v": np.sin(time),
-            }
-        )
-        for case, kind, order, _ in cases
-    ]
-    fields = [snapshot(case, time) for case in "abc" for time in (0.0, 0.3, 0.6)]
-    return {"runs": runs, "steps": pd.concat(steps), "fields": pd.concat(fields)}
-
-
-def picture(frames: dict[str, pd.DataFrame], **spec: Any) -> Figure:
-    return draw(ADAPTER.validate_python({"name": "picture", **spec}), **frames)
-
-
-def legend(figure: Figure) -> list[str]:
-    return [text.get_text() for each in figure.legends for text in each.get_texts()]
 
 
 def curves(axes: Axes) -> list[np.ndarray]:
@@ -173,7 +95,7 @@ def test_legend_is_inside_the_paper_and_off_the_axes(frames: dict[str, pd.DataFr
     assert figure.bbox.x0 <= box.x0
     assert box.x1 <= figure.bbox.x1
     assert box.y0 >= figure.axes[0].get_window_extent().y1
-    styles = {(line.get_color(), line.get_linestyle()) for line in figure.axes[0].lines}
+    styles = {(line.get_color(), str(line._unscaled_dash_pattern)) for line in figure.axes[0].lines}  # type: ignore[attr-defined]
     assert len(styles) == 12
 
 

@@ -18,7 +18,8 @@ from nlsolve.results.parameters import differing_parameters
 from nlsolve.results.verdicts import cheapest, outcome, percent
 from nlsolve.show.figures import BaseFigure, FigureError, FigureSpec, draw
 from nlsolve.show.figures.map import code, short
-from nlsolve.show.figures.style import ACCENT, PAGE
+from nlsolve.show.figures.paper.look import PAGE
+from nlsolve.show.figures.style import ACCENT
 
 ADAPTER: TypeAdapter[BaseFigure] = TypeAdapter(FigureSpec)
 NOTHING = pd.DataFrame()

@@ -11,7 +11,7 @@ from typing import Any
 
 import pandas as pd
 from pyarrow import ArrowException
-from pydantic import ValidationError
+from pydantic import TypeAdapter, ValidationError
 
 from nlsolve.contracts.status import STOPPED, Status
 from nlsolve.results.costs.cost_prediction import with_predictions
@@ -24,12 +24,15 @@ from nlsolve.running.store.claims import claimed
 from nlsolve.running.store.identity import Identity, case_of
 from nlsolve.running.store.parts import CASES, Entry, Parts, StoreError, merge, output_path
 from nlsolve.running.store.sources import fingerprint, source_of
+from nlsolve.show.figures import BaseFigure, FigureSpec
 from nlsolve.show.tables import TableSpec
 from nlsolve.study.case import Case
 from nlsolve.study.study import Study
 
 STUDY, SHOWN = "study.json", "shown.json"
 """Names of the files that describe the study which a folder was last used for, and what was shown of it."""
+
+FIGURES: TypeAdapter[tuple[BaseFigure, ...]] = TypeAdapter(tuple[FigureSpec, ...], config={"defer_build": True})
 
 VIEWS = ("results", "show")
 """What of nlsolve makes tables, figures and the report."""
@@ -52,10 +55,11 @@ class Description:
     question: str
     cases: tuple[Planned, ...]
     tables: tuple[TableSpec, ...]
+    figures: tuple[BaseFigure, ...] = ()
 
     def study(self) -> Study:
-        """The study with its tables, without its cases and figures."""
-        return Study(self.name, self.question, (), self.tables)
+        """The study with its tables and figures, without its cases."""
+        return Study(self.name, self.question, (), self.tables, self.figures)
 
 
 def describe(study: Study, identities: Mapping[str, Identity]) -> dict[str, Any]:
@@ -72,6 +76,7 @@ def describe(study: Study, identities: Mapping[str, Identity]) -> dict[str, Any]
             for case in study.cases
         ],
         "tables": [table.model_dump(mode="json") for table in study.tables],
+        "figures": [figure.model_dump(mode="json") for figure in study.figures],
     }
 
 
@@ -86,7 +91,8 @@ def description_of(folder: Path) -> Description | None:
         document = json.loads((folder / STUDY).read_text(encoding="utf-8"))
         cases = tuple(Planned(**case) for case in document["cases"])
         tables = tuple(TableSpec.model_validate(table) for table in document["tables"])
-        return Description(document["name"], document["question"], cases, tables)
+        figures = FIGURES.validate_python(document.get("figures", []))
+        return Description(document["name"], document["question"], cases, tables, figures)
     except (OSError, ValueError, TypeError, KeyError, ValidationError):
         return None
 

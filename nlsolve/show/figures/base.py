@@ -10,20 +10,20 @@ from typing import ClassVar
 import pandas as pd
 from pydantic import Field
 
-from nlsolve.contracts.component import Component
 from nlsolve.registry.problems import StudyError
 from nlsolve.results.columns import RENAMED, is_timed, no_such_column
 from nlsolve.results.costs.lanes import ONE, Lanes, on_seconds
 from nlsolve.results.frames import Frames, rows_of
 from nlsolve.results.selection import Names, Where, fits
 from nlsolve.show import plotting
+from nlsolve.show.figures.paper.look import Look
 
 
 class FigureError(ValueError):
     """A declared figure cannot be drawn from these results; its sentence says why, and what there is instead."""
 
 
-class BaseFigure(Component, ABC):
+class BaseFigure(Look, ABC):
     """A figure as a study declares it: a kind adds its fields and paints itself."""
 
     noun: ClassVar[str] = "figure"
@@ -60,8 +60,8 @@ class BaseFigure(Component, ABC):
             raise self.refuse(str(error)) from error
 
     @abstractmethod
-    def paint(self, figure: plotting.Figure, frames: Frames) -> None:
-        """Draw on an empty figure."""
+    def paint(self, figure: plotting.Figure, frames: Frames) -> pd.DataFrame:
+        """Draw on an empty figure. Returns what is drawn: a row a point or cell, columns by their names in results."""
 
     def refuse(self, sentence: str) -> FigureError:
         """The exception that says why this figure cannot be drawn."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from typing import Any
 
@@ -85,6 +86,12 @@ def number_text(value: Any) -> str:
     mantissa, power = f"{value:.5e}".split("e")
     mantissa = mantissa.rstrip("0").rstrip(".")
     return f"$10^{{{int(power)}}}$" if mantissa == "1" else rf"${mantissa}\times 10^{{{int(power)}}}$"
+
+
+def plain(text: str) -> str:
+    r"""A label without mathematics, for data: "tolerance $10^{-6}$, $t$ = 0.3 s" -> "tolerance 1e-6, t = 0.3 s"."""
+    text = re.sub(r"\$([\d.+-]+)\\times 10\^\{(-?\d+)\}\$", r"\1e\2", text)
+    return re.sub(r"\$10\^\{(-?\d+)\}\$", r"1e\1", text).replace("$", "")
 
 
 def ending(run: pd.Series) -> str:

@@ -5,17 +5,19 @@ from __future__ import annotations
 from typing import Any, Literal
 
 import numpy as np
+import pandas as pd
 from pydantic import Field
 
 from nlsolve.registry.problems import StudyError
 from nlsolve.results.costs.crossover import OTHER, Cell, Crossover, by_size, reference_cells
 from nlsolve.results.costs.lower_envelope import lower_envelope
-from nlsolve.results.frames import Frames, rows_of
+from nlsolve.results.frames import Frames, Row, rows_of
 from nlsolve.results.selection import Names
 from nlsolve.show import plotting
 from nlsolve.show.figures.base import BaseFigure
 from nlsolve.show.figures.cases import select
-from nlsolve.show.figures.style import ACCENT, PAGE, curve_style, join, legend_outside
+from nlsolve.show.figures.paper.look import COLUMN, PAGE
+from nlsolve.show.figures.style import ACCENT, curve_style, headed, join, legend_outside
 
 MARGIN = 3.0  # of ρ on either side of the cells
 POINTS = 200  # of a line; straight lines bend on logarithmic axes
@@ -42,7 +44,7 @@ class CrossoverFigure(BaseFigure):
     def shows_seconds(self) -> bool:
         return True
 
-    def paint(self, figure: plotting.Figure, frames: Frames) -> None:
+    def paint(self, figure: plotting.Figure, frames: Frames) -> pd.DataFrame:
         for column in (*self.strategy, *self.size, *self.backend):
             self.require(column, frames.runs, "runs")
         axes_of = Crossover(strategy=self.strategy, size=self.size, backend=self.backend)
@@ -52,9 +54,10 @@ class CrossoverFigure(BaseFigure):
             raise self.refuse(str(error)) from error
         strategies = list(dict.fromkeys(name for cell in cells for name in cell.strategies))
         sizes = by_size(cells)
-        columns = min(2, len(sizes))
+        width = self.wide(PAGE)
+        columns = min(2 if width > COLUMN else 1, len(sizes))
         rows = -(-len(sizes) // columns)
-        figure.set_size_inches(PAGE, (0.42 if columns == 2 else 0.5) * PAGE * rows)
+        figure.set_size_inches(width, max((0.42 if columns == 2 else 0.5) * width, 0.6 * COLUMN) * rows)
         panels = figure.subplots(rows, columns, sharex=True, squeeze=False).ravel()
         for panel in panels[len(sizes) :]:
             panel.remove()
@@ -62,13 +65,14 @@ class CrossoverFigure(BaseFigure):
             panel.tick_params(labelbottom=True)
         ratios = [cell.unit.ratio for cell in cells]
         across = np.geomspace(min(ratios) / MARGIN, max(ratios) * MARGIN, POINTS)
+        told: list[Row] = []
         for panel, reference, (size, members) in zip(panels, reference_cells(cells), sizes.items(), strict=False):
-            self._panel(panel, reference, members, strategies, across)
-            panel.set_title(join(size, _score(members)))
-        figure.supxlabel("factorisation / triangular solve", fontsize=9)
-        figure.supylabel("cost [triangular solves]", fontsize=9)
+            told += self._panel(panel, reference, members, strategies, across)
+            panel.set_title(headed(figure, join(size, _score(members)), 1 / columns))
+        figure.supxlabel("factorisation / triangular solve")
+        figure.supylabel("cost [triangular solves]")
         if self.title:
-            figure.suptitle(self.title, fontsize=9)
+            figure.suptitle(headed(figure, self.title))
         handles: list[Any] = [
             plotting.Line2D([], [], label=name, **curve_style(place, 1, markers=True))
             for place, name in enumerate(strategies)
@@ -77,11 +81,13 @@ class CrossoverFigure(BaseFigure):
         if any(cell.verdict == OTHER for cell in cells):
             handles.append(plotting.Line2D([], [], color=ACCENT, linewidth=0.8, linestyle=":", label=LOST))
         legend_outside(figure, handles, [str(handle.get_label()) for handle in handles])
+        return pd.DataFrame(told)
 
     def _panel(
         self, axes: plotting.Axes, reference: Cell, members: list[Cell], strategies: list[str], across: Any
-    ) -> None:
-        """The lines of one size, their envelope, and the runs of its cells."""
+    ) -> list[Row]:
+        """Draw the lines of one size, their envelope, and the runs of its cells. Returns a row a run, with its line."""
+        told: list[Row] = []
         slopes, rests = reference.factorizations, reference.rests
         lowest = np.min(slopes[:, None] * across + rests[:, None], axis=0)
         axes.plot(across, lowest, color="0.85", linewidth=5, zorder=1, solid_capstyle="butt")
@@ -100,12 +106,26 @@ class CrossoverFigure(BaseFigure):
                 axes.plot([cell.unit.ratio], [height * cell.seconds[s]], **mark)
                 ends = [height * cell.seconds[s], height * cell.slowest[s]]
                 axes.plot([cell.unit.ratio] * 2, ends, color=mark["color"], linewidth=0.6, zorder=2)
+                told.append(
+                    {
+                        "size": cell.size,
+                        "backend": cell.backend,
+                        "strategy": name,
+                        "factorizations": slope,
+                        "rest": rest,
+                        "factor_solve_ratio": cell.unit.ratio,
+                        "cost_predicted": slope * cell.unit.ratio + rest,
+                        "cost": ends[0],
+                        "cost_most": ends[1],
+                    }
+                )
         for cell in members:
             if cell.verdict == OTHER:
                 axes.axvline(cell.unit.ratio, color=ACCENT, linewidth=0.8, linestyle=":", zorder=0)
         axes.set(xscale="log", yscale="log", xlim=(across[0], across[-1]))
         axes.grid(True, color="0.92", linewidth=0.5)
         axes.set_axisbelow(True)
+        return told
 
 
 def _score(members: list[Cell]) -> str:

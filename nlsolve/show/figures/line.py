@@ -16,8 +16,8 @@ from nlsolve.results.frames import Frames
 from nlsolve.results.selection import Names
 from nlsolve.show import plotting
 from nlsolve.show.figures.base import BaseFigure, listing
-from nlsolve.show.figures.cases import ending, labelled, select
-from nlsolve.show.figures.style import ACCENT, DASHES, FAILED, axis_label, bracketed, curve_style, finish, join, symbol
+from nlsolve.show.figures.cases import ending, labelled, plain, select
+from nlsolve.show.figures.style import ACCENT, FAILED, axis_label, bracketed, curve_style, finish, join, symbol
 
 
 class LineFigure(BaseFigure):
@@ -43,7 +43,7 @@ class LineFigure(BaseFigure):
         of_steps = (self.x, *self.y) if self.source == "steps" else ()
         return super().shows_seconds or any(name in STEPS and STEPS[name].timed for name in of_steps)
 
-    def paint(self, figure: plotting.Figure, frames: Frames) -> None:
+    def paint(self, figure: plotting.Figure, frames: Frames) -> pd.DataFrame:
         frame = frames.steps if self.source == "steps" else frames.runs
         for column in (self.x, *self.y):
             self.require(column, frame, self.source)
@@ -53,13 +53,16 @@ class LineFigure(BaseFigure):
         axes.set_xscale("log" if "x" in self.log else "linear")
         axes.set_yscale("log" if "y" in self.log else "linear")
         drawn = dict.fromkeys(self.y, 0)
+        told = []
         for number, (label, rows) in enumerate(curves):
+            told.append(self._told(label, rows))
             for which, column in enumerate(self.y):
                 points = self._points(rows, column)
                 drawn[column] += len(points)
                 name = join(label, symbol(column, self.source) if len(self.y) > 1 else "")
-                place, dashes = (number, DASHES[which % len(DASHES)]) if several else (which, DASHES[0])
-                style = curve_style(place, len(points), self.markers or worded, "none" if worded else dashes)
+                place = number if several else which
+                style = curve_style(place, len(points), self.markers or worded, number * len(self.y) + which)
+                style |= {"linestyle": "none"} if worded else {}
                 axes.plot(points[self.x], points[column], label=name if len(points) else f"{name} (no values)", **style)
                 self._cross_out(axes, points, column)
         for column, count in drawn.items():
@@ -74,6 +77,14 @@ class LineFigure(BaseFigure):
         elif "x" not in self.log and _whole(frame[self.x]):
             axes.xaxis.set_major_locator(plotting.MaxNLocator(integer=True, steps=[1, 5, 10]))
         finish(figure, axes, self.title)
+        return pd.concat(told, ignore_index=True)
+
+    def _told(self, label: str, rows: pd.DataFrame) -> pd.DataFrame:
+        """The points of one curve, with its name and the cases that they are of; NaN where a value is not drawn."""
+        fits = {column: self._fit(rows, column) for column in self.y}
+        shown = rows.assign(**{column: rows[column].where(fit) for column, fit in fits.items()}, curve=plain(label))
+        names = [name for name in dict.fromkeys(("curve", "case", self.x, *self.y)) if name in shown]
+        return self._sorted(shown.loc[np.any(list(fits.values()), axis=0), names])
 
     def _curves(self, frames: Frames) -> list[tuple[str, pd.DataFrame]]:
         """Label and rows of every curve."""
@@ -88,8 +99,12 @@ class LineFigure(BaseFigure):
 
     def _points(self, rows: pd.DataFrame, column: str) -> pd.DataFrame:
         """The rows that can be drawn: finite, and positive along a logarithmic axis."""
-        fit = _drawable(rows[self.x], "x" in self.log) & _drawable(rows[column], "y" in self.log)
-        points = rows[fit]
+        return self._sorted(rows[self._fit(rows, column)])
+
+    def _fit(self, rows: pd.DataFrame, column: str) -> NDArray[np.bool_]:
+        return _drawable(rows[self.x], "x" in self.log) & _drawable(rows[column], "y" in self.log)
+
+    def _sorted(self, points: pd.DataFrame) -> pd.DataFrame:
         sort = self.source == "runs" and _numeric(points[self.x])
         return points.sort_values(self.x, kind="stable") if sort else points
 

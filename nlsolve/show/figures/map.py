@@ -18,14 +18,13 @@ from nlsolve.results.verdicts import ACCEPTED, WRONG, Run, doubt, is_error, numb
 from nlsolve.show import plotting
 from nlsolve.show.figures.base import BaseFigure, listing
 from nlsolve.show.figures.cases import label_of, number_text, select
+from nlsolve.show.figures.paper.look import COLUMN, FONT_SIZE, MILLIMETRE, PAGE
 from nlsolve.show.figures.style import (
     ACCENT,
-    COLUMN,
     ERROR_MAP,
     IN_DOUBT,
-    MILLIMETRE,
-    PAGE,
     axis_label,
+    headed,
     legend_outside,
     letters,
 )
@@ -33,6 +32,7 @@ from nlsolve.show.figures.style import (
 MOST_CELLS = 2000
 ROW, CELL, LETTER, MARGIN = 4.6, 17.0, 1.45, 8.0  # height of a row, widths of a column and of a label's letter [mm]
 LETTERS_IN_CELL = 7  # "0.031 %"
+LEAST_CELL = 4.0  # width of a cell in which its words can be read [mm]
 DOUBT = "#D55E00"
 FAILED_FACE: Any = {"facecolor": "0.93", "edgecolor": "0.72", "hatch": "//////", "linewidth": 0}
 NO_NUMBER = "–"
@@ -71,7 +71,7 @@ class MapFigure(BaseFigure):
     def columns_of_runs(self) -> dict[str, Names]:
         return {**super().columns_of_runs(), "x": self.x, "y": self.y, "value": (self.value,)}
 
-    def paint(self, figure: plotting.Figure, frames: Frames) -> None:
+    def paint(self, figure: plotting.Figure, frames: Frames) -> pd.DataFrame:
         runs = select(self, frames.runs)
         for column in (*self.x, *self.y, self.value):
             self.require(column, runs, "runs")
@@ -85,24 +85,37 @@ class MapFigure(BaseFigure):
             self._tile(run, columns.index(x), rows.index(y)) for run, x, y in zip(members, across, down, strict=True)
         ]
         norm = self._norm(tiles)
-        beside, above = (LETTER * max(map(letters, labels)) for labels in (rows, columns))
-        width = float(
-            np.clip(beside + max(CELL, above) * len(columns) + MARGIN, COLUMN / MILLIMETRE, PAGE / MILLIMETRE)
-        )
+        scale = (self.font_size or FONT_SIZE) / FONT_SIZE
+        beside, above = (scale * LETTER * max(map(letters, labels)) for labels in (rows, columns))
+        usual = np.clip(beside + max(CELL, above) * len(columns) + MARGIN, COLUMN / MILLIMETRE, PAGE / MILLIMETRE)
+        width = self.wide(float(usual) * MILLIMETRE) / MILLIMETRE
         room = (width - beside - MARGIN) / len(columns)
-        height = ROW * len(rows) + 6 + 20 * (norm is not None) + 0.6 * above * (above > room)
+        if room < LEAST_CELL:
+            raise self.refuse(
+                f"{len(columns)} columns beside these names leave {max(room, 0):.1f} mm for a cell of {width:.0f} mm; "
+                "choose a larger width, a smaller font_size, or fewer columns"
+            )
+        height = scale * ROW * len(rows) + 6 + 20 * (norm is not None) + 0.6 * above * (above > room)
         figure.set_size_inches(width * MILLIMETRE, height * MILLIMETRE)
         axes = figure.add_subplot()
         self._grid(axes, columns, rows, leaning=above > room)
-        size = float(np.clip(room / LETTERS_IN_CELL / 0.16, 4.5, 7.5))  # a letter is 0.16 mm wide a point of type
+        largest = 7.5 * scale
+        size = float(np.clip(room / LETTERS_IN_CELL / 0.16, min(4.5, largest), largest))  # a letter: 0.16 mm a point
         for tile in tiles:
             self._paint_tile(axes, tile, norm, size)
         self._empty_places(axes, {(tile.column, tile.row) for tile in tiles}, len(columns), len(rows), size)
         if norm is not None:
             self._bar(figure, axes, norm, len(rows))
         if self.title:
-            axes.set_title(self.title)
+            axes.set_title(headed(figure, self.title))
         self._legend(figure, tiles)
+        return self._told(runs, tiles)
+
+    def _told(self, runs: pd.DataFrame, tiles: Sequence[Tile]) -> pd.DataFrame:
+        """The cells, row by row as `runs` has them, with the marks on them."""
+        names = dict.fromkeys(("case", *self.x, *self.y, self.value, "status"))
+        told = runs[[name for name in names if name in runs]]
+        return told.assign(in_doubt=[tile.doubted for tile in tiles], false_success=[tile.wrong for tile in tiles])
 
     def _refuse_twins(self, runs: pd.DataFrame, places: Sequence[tuple[str, str]]) -> None:
         for place in dict.fromkeys(places):

@@ -20,8 +20,9 @@ from nlsolve.results.verdicts import ACCEPTED, Run, number, solved
 from nlsolve.series import Array
 from nlsolve.show import plotting
 from nlsolve.show.figures.base import BaseFigure, listing
-from nlsolve.show.figures.cases import label_of, labelled, select
-from nlsolve.show.figures.style import PAGE, axis_label, curve_style, finish, join, symbol
+from nlsolve.show.figures.cases import label_of, labelled, plain, select
+from nlsolve.show.figures.paper.look import COLUMN, PAGE
+from nlsolve.show.figures.style import axis_label, curve_style, finish, headed, join, symbol
 
 Weights = Annotated[
     dict[str, Annotated[float, Field(gt=0)]],
@@ -76,7 +77,7 @@ class SolvedFigure(BaseFigure):
     def words(self) -> str:
         """The label of the horizontal axis."""
 
-    def paint(self, figure: plotting.Figure, frames: Frames) -> None:
+    def paint(self, figure: plotting.Figure, frames: Frames) -> pd.DataFrame:
         runs = select(self, frames.runs)
         for column in (*self.problem, *self.cost, self.error):
             self.require(column, runs, "runs")
@@ -85,18 +86,20 @@ class SolvedFigure(BaseFigure):
         places = np.unique(reached[np.isfinite(reached)])
         if not len(places):
             raise self.refuse(f"none of the {len(runs)} chosen runs solved its problem, so there is no cost to show")
-        figure.set_size_inches(PAGE, 0.5 * PAGE)
+        width = self.wide(PAGE)
+        figure.set_size_inches(width, max(0.5 * width, 0.6 * COLUMN))
         axes = figure.add_subplot()
         axes.set(xscale="log", xlabel=self.words(), ylabel="share of the problems solved", ylim=(-0.02, 1.02))
         right = places[-1] * max(1.05, (places[-1] / places[0]) ** 0.03)
-        self._stairs(axes, found.labels, reached, np.r_[places, right])
+        told = self._stairs(axes, found.labels, reached, np.r_[places, right])
         axes.set_xlim(places[0], right)
         axes.xaxis.set_major_formatter(plotting.LogFormatter())
         axes.xaxis.set_minor_formatter(plotting.LogFormatter(minor_thresholds=(1.0, 0.4)))
         finish(figure, axes, None)
         hard = int(np.isinf(reached).all(axis=0).sum())
         nobody = f"{hard} of {reached.shape[1]} problems are solved by none" if hard else ""
-        axes.set_title(join(self.title, nobody))
+        axes.set_title(headed(figure, join(self.title, nobody)))
+        return told
 
     def costs(self, runs: pd.DataFrame) -> Costs:
         """The cost of every strategy for every problem. Raises FigureError unless each has run each problem once."""
@@ -142,18 +145,23 @@ class SolvedFigure(BaseFigure):
             )
         return float(total)
 
-    def _stairs(self, axes: plotting.Axes, labels: tuple[str, ...], reached: Array, places: Array) -> None:
+    def _stairs(self, axes: plotting.Axes, labels: tuple[str, ...], reached: Array, places: Array) -> pd.DataFrame:
+        """Draw the stairs and their bands. Returns their corners: a row a strategy and place."""
         shares = within(reached, places)
         ends = band(reached, places, self.interval, self.bootstrap, self.seed) if self.bootstrap else None
         problems = reached.shape[1]
+        told = []
         for line, label in enumerate(labels):
             style = curve_style(line, len(places), markers=False)
             count = int(np.isfinite(reached[line]).sum())
             axes.step(places, shares[line], where="post", label=f"{label} ({count}/{problems})", **style)
+            told.append(pd.DataFrame({"strategy": plain(label), "cost": places, "share": shares[line]}))
             if ends is not None:
                 low, high = ends[0][line], ends[1][line]
                 fill: Any = {"step": "post", "color": style["color"], "alpha": WIDEST_BAND, "linewidth": 0}
                 axes.fill_between(places, low, high, **fill)
+                told[-1] = told[-1].assign(share_low=low, share_high=high)
+        return pd.concat(told, ignore_index=True)
 
     def work(self) -> str:
         """The cost in words: "time inside the method", "triangular solves + 20 factorisations"."""

@@ -19,7 +19,8 @@ from nlsolve.series import Array
 from nlsolve.show import plotting
 from nlsolve.show.figures.base import BaseFigure
 from nlsolve.show.figures.cases import label_of, labelled, select
-from nlsolve.show.figures.style import ACCENT, COLOURS, IN_DOUBT, MARKERS, PAGE, axis_label, join, legend_outside
+from nlsolve.show.figures.paper.look import COLUMN, PAGE
+from nlsolve.show.figures.style import ACCENT, COLOURS, IN_DOUBT, MARKERS, axis_label, headed, join, legend_outside
 
 FRONT = "no run is cheaper and better"
 
@@ -40,7 +41,7 @@ class TradeFigure(BaseFigure):
     def columns_of_runs(self) -> dict[str, Names]:
         return {**super().columns_of_runs(), "x": (self.x,), "y": (self.y,)}
 
-    def paint(self, figure: plotting.Figure, frames: Frames) -> None:
+    def paint(self, figure: plotting.Figure, frames: Frames) -> pd.DataFrame:
         for column in (self.x, self.y):
             self.require(column, frames.runs, "runs")
         chosen = select(self, frames.runs)
@@ -51,21 +52,28 @@ class TradeFigure(BaseFigure):
             raise self.refuse(
                 f"none of the {len(chosen)} chosen runs converged with positive numbers in {self.x!r} and {self.y!r}"
             )
-        figure.set_size_inches(PAGE, 0.5 * PAGE)
+        width = self.wide(PAGE)
+        figure.set_size_inches(width, max(0.5 * width, 0.6 * COLUMN))
         axes = figure.add_subplot()
         axes.set(xscale="log", yscale="log", xlabel=axis_label([self.x], "runs"), ylabel=axis_label([self.y], "runs"))
         handles = self._points(axes, runs)
         front = _front(runs[self.x].to_numpy(float), runs[self.y].to_numpy(float))
+        reached = set(zip(*front, strict=True))
         axes.margins(0.06)
         axes.step(*front, where="post", color="0.35", linewidth=0.8, zorder=1)
         handles.append(plotting.Line2D([], [], color="0.35", linewidth=0.8, label=FRONT))
         axes.grid(True, color="0.92", linewidth=0.5)
         axes.set_axisbelow(True)
-        axes.set_title(join(self.title, *self._left_out(chosen, converged, runs)))
+        axes.set_title(headed(figure, join(self.title, *self._left_out(chosen, converged, runs))))
         legend_outside(figure, handles, [str(handle.get_label()) for handle in handles])
         winners = self._winners(axes, runs)
         if winners:
             legend_outside(figure, winners, [str(handle.get_label()) for handle in winners], "lower")
+        names = dict.fromkeys(("case", *differing_parameters(runs), *self.group, self.x, self.y))
+        told = runs[[name for name in names if name in runs]]
+        places = zip(runs[self.x].astype(float), runs[self.y].astype(float), strict=True)
+        doubted = [bool(doubt(run)) for run in rows_of(runs)]
+        return told.assign(in_doubt=doubted, front=[place in reached for place in places])
 
     def _points(self, axes: plotting.Axes, runs: pd.DataFrame) -> list[Any]:
         """Draw the marks by group; returns their entries of the legend."""

@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from pydantic import ValidationError
-from typesetting import ENGINES, letters_of, needs, typeset, words_on
+from typesetting import ENGINES, as_letters, needs, typeset, words_on
 
 import nlsolve
 from nlsolve.registry.problems import StudyError
@@ -322,11 +322,6 @@ def test_the_field_cases_show_every_letter(tmp_path, engine, field_cases):
         for text in texts:
             for word in text.split():
                 assert as_letters(word, engine) in shown, word
-
-
-def as_letters(text: str, engine: str) -> str:
-    """What is read of a text on the page: pdflatex draws an underscore as a line, lualatex reads ‖ as a k."""
-    return letters_of({"pdflatex": text.replace("_", ""), "lualatex": text.replace("‖", "k")}.get(engine, text))
 
 
 EVERY_LETTER = "!\"#$%&'()*+,-./:;<=>?@[\\]^_`{|}~ "

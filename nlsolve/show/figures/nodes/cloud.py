@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, Literal
 
 import numpy as np
@@ -9,10 +10,9 @@ import pandas as pd
 import scipy
 from pydantic import Field
 
-from nlsolve.results.frames import Frames
 from nlsolve.series import Array
 from nlsolve.show import plotting
-from nlsolve.show.figures.nodes.panels import PanelsFigure, layer_names, panels_of, snapshots_of
+from nlsolve.show.figures.nodes.panels import PanelsFigure, Snapshot, layer_names, panels_of
 from nlsolve.show.figures.nodes.sections import boundaries
 from nlsolve.show.figures.style import ACCENT, COLOURS, legend_outside
 
@@ -30,10 +30,16 @@ class CloudFigure(PanelsFigure):
     kind: Literal["cloud"] = "cloud"
     probe: tuple[float, float] | None = Field(None, description="place at t = 0 whose nearest node is marked [mm]")
 
-    def paint(self, figure: plotting.Figure, frames: Frames) -> None:
-        snapshots = snapshots_of(self, frames, ("x", "y", "x0", "y0"))
-        apart, over = self.layers(snapshots)
-        for axes, snapshot in panels_of(figure, self, apart, bar=False):
+    @property
+    def columns(self) -> tuple[str, ...]:
+        return ("x", "y", "x0", "y0")
+
+    def drawn(self, rows: pd.DataFrame) -> pd.DataFrame:
+        return _material(rows)
+
+    def show(self, figure: plotting.Figure, shown: Sequence[Snapshot], among: Sequence[Snapshot]) -> None:
+        apart, over = self.layers(shown)
+        for axes, snapshot in panels_of(figure, self, apart, among, bar=False):
             self._nodes(axes, snapshot.rows)
             for layer in over:
                 places = _material(layer.rows)[["x", "y"]].to_numpy(float)

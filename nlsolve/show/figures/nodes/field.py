@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, Literal
 
 import numpy as np
 from pydantic import Field
 
-from nlsolve.results.frames import Frames
 from nlsolve.series import Array
 from nlsolve.show import plotting
-from nlsolve.show.figures.nodes.panels import PanelsFigure, Snapshot, layer_names, panels_of, snapshots_of
+from nlsolve.show.figures.nodes.panels import PanelsFigure, Snapshot, layer_names, panels_of
 from nlsolve.show.figures.nodes.sections import outline, triangulate
-from nlsolve.show.figures.style import DASHES, axis_label, legend_outside
+from nlsolve.show.figures.style import DASHES, POSITIVE_MAP, SIGNED_MAP, axis_label, legend_outside
 
-SIGNED_MAP, POSITIVE_MAP = "RdBu_r", "viridis"
 LEVELS = 20
+NEGATIVE: Any = (0, (4, 3))  # dashes of the lines where a value is negative
 FLOOR = 1e-12  # of the largest value: what a logarithmic field shows at least
 
 
@@ -29,22 +29,34 @@ class FieldFigure(PanelsFigure):
         None, gt=0, description="largest magnitude the colours distinguish; absent: the largest"
     )
 
-    def paint(self, figure: plotting.Figure, frames: Frames) -> None:
+    @property
+    def columns(self) -> tuple[str, ...]:
+        return ("x", "y", self.value)
+
+    def show(self, figure: plotting.Figure, shown: Sequence[Snapshot], among: Sequence[Snapshot]) -> None:
         if self.log and self.value != "rate":
             raise self.refuse(f"value = {self.value!r} has a sign, so log = true cannot show it; only 'rate' can")
-        snapshots = snapshots_of(self, frames, ("x", "y", self.value))
-        levels, extend = self._levels(np.concatenate([s.rows[self.value].to_numpy(float) for s in snapshots]))
-        apart, over = self.layers(snapshots)
-        panels = panels_of(figure, self, apart, bar=True)
-        outlines: Any = [{"color": "black", "linewidth": 0.5, "linestyle": DASHES[k % 4]} for k in range(len(over))]
+        levels, extend = self._levels(np.concatenate([s.rows[self.value].to_numpy(float) for s in among]))
+        apart, over = self.layers(shown)
+        panels = panels_of(figure, self, apart, among, bar=True)
+        outlines: Any = [
+            {"color": "black", "linewidth": 0.5, "linestyle": DASHES[k % len(DASHES)]} for k in range(len(over))
+        ]
+        below = levels[:0] if over or self.log else levels[levels < 0][1 :: LEVELS // 5]
+        negative = None
         contours = None
         for axes, snapshot in panels:
-            triangles, shown = self._shown(snapshot, levels[0])
+            triangles, values = self._shown(snapshot, levels[0])
             colours = POSITIVE_MAP if self.value == "rate" else SIGNED_MAP
-            contours = axes.tricontourf(triangles, shown, levels=levels, cmap=colours, extend=extend)
+            contours = axes.tricontourf(triangles, values, levels=levels, cmap=colours, extend=extend)
             contours.set_edgecolor("face")  # hides the seams that PDF viewers draw between bands
             contours.set_linewidth(0.2)
             axes.add_collection(plotting.LineCollection(list(outline(triangles)), colors="0.25", linewidths=0.5))
+            low, high = snapshot.rows[self.value].min(), snapshot.rows[self.value].max()
+            if ((low < below) & (below < high)).any():  # in grey, negative values are told by dashes
+                negative = axes.tricontour(
+                    triangles, values, levels=below, colors="0.2", linewidths=0.4, linestyles=[NEGATIVE]
+                )
             for layer, line in zip(over, outlines, strict=True):
                 every = {"colors": line["color"], "linewidths": line["linewidth"], "linestyles": line["linestyle"]}
                 axes.tricontour(*self._shown(layer, levels[0]), levels=levels[:: LEVELS // 5], **every)
@@ -53,6 +65,9 @@ class FieldFigure(PanelsFigure):
         bar.set_label(axis_label([self.value], "fields"))
         bar.ax.tick_params(direction="out", right=True)
         bar.outline.set_linewidth(0.5)
+        if negative is not None:
+            bar.add_lines(negative)
+            bar.lines[-1].set_linestyle(NEGATIVE)
         ticks = plotting.MaxNLocator(7, integer=self.log, steps=[1, 2, 5, 10]).tick_values(levels[0], levels[-1])
         bar.locator = plotting.FixedLocator([tick for tick in ticks if levels[0] <= tick <= levels[-1]])
         if self.log:

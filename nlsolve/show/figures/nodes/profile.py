@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 import pandas as pd
@@ -12,9 +12,22 @@ from nlsolve.results.columns import FIELDS
 from nlsolve.results.frames import Frames
 from nlsolve.series import Array
 from nlsolve.show import plotting
+from nlsolve.show.figures.cases import plain
 from nlsolve.show.figures.nodes.panels import NodesFigure, snapshots_of
 from nlsolve.show.figures.nodes.sections import slice_triangles, triangulate
 from nlsolve.show.figures.style import axis_label, curve_style, finish, join
+
+EXACT: Any = {
+    "color": "black",
+    "linestyle": (0, (4, 3)),
+    "linewidth": 0.6,
+    "marker": "+",
+    "markersize": 4,
+    "markeredgewidth": 0.6,
+    "markevery": 0.06,
+    "zorder": 3,
+}
+"""The exact solution, told by its crosses from the curves, which have none."""
 
 
 class ProfileFigure(NodesFigure):
@@ -26,11 +39,12 @@ class ProfileFigure(NodesFigure):
     value: Literal["u", "v", "exx", "eyy", "exy", "rate"] = Field(description="column of `fields`")
     log: bool = Field(False, description="logarithmic vertical axis")
 
-    def paint(self, figure: plotting.Figure, frames: Frames) -> None:
+    def paint(self, figure: plotting.Figure, frames: Frames) -> pd.DataFrame:
         snapshots = snapshots_of(self, frames, ("x", "y", self.value))
         axes = figure.add_subplot()
         axes.set_yscale("log" if self.log else "linear")
         exact = f"exact_{self.value}"
+        told = []
         exacts: list[tuple[Array, Array]] = []
         for number, snapshot in enumerate(snapshots):
             label = snapshot.heading if len(snapshots) > 1 else snapshot.label
@@ -39,13 +53,15 @@ class ProfileFigure(NodesFigure):
                 continue
             place, value = self._slice(snapshot.rows, self.value)
             axes.plot(place, value, label=label, **curve_style(number, len(place), False))
+            told.append(self._told(label, place, value))
             if exact in snapshot.rows and np.isfinite(snapshot.rows[exact].to_numpy(float)).any():
                 pair = self._slice(snapshot.rows, exact)
                 if not any(np.array_equal(pair, known, equal_nan=True) for known in exacts):
                     exacts.append(pair)
         for number, pair in enumerate(exacts):
             label = "" if number else "exact"
-            axes.plot(*pair, color="black", linestyle=(0, (4, 3)), linewidth=0.6, zorder=3, label=label)
+            told.append(self._told("exact", *pair))
+            axes.plot(*pair, label=label, **EXACT)
         if exacts and len(snapshots) == 1 and not snapshots[0].label:
             axes.lines[0].set_label(FIELDS[self.value].symbol)
         other = "y" if self.axis == "x" else "x"
@@ -55,6 +71,12 @@ class ProfileFigure(NodesFigure):
         axes.set_ylabel(axis_label([self.value], "fields"))
         note = snapshots[0].note if len(snapshots) == 1 else ""
         finish(figure, axes, join(self.title, note))
+        return pd.concat(told, ignore_index=True)
+
+    def _told(self, label: str, place: Array, value: Array) -> pd.DataFrame:
+        """A curve, which has a row of NaN where it is broken."""
+        across = "y" if self.axis == "x" else "x"
+        return pd.DataFrame({"curve": plain(label), self.axis: place, across: self.at, self.value: value})
 
     def _slice(self, rows: pd.DataFrame, column: str) -> tuple[Array, Array]:
         value = rows[column].to_numpy(float)
