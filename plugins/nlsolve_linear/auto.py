@@ -20,7 +20,8 @@ class Auto(LinearSolver):
     """SuperLU for a small matrix; for a larger one the first that is installed of PARDISO, rslab and SuperLU.
 
     Where that finds the matrix singular, the next one is asked: those with pivots in supernodes give up earlier than
-    SuperLU, which has the last word. The column `linear_chosen` says which it was.
+    SuperLU, which has the last word. No orderings are tried, so that factorisations are counted alike whatever is
+    installed. The column `linear_chosen` says which it was.
     """
 
     kind: Literal["auto"] = "auto"
@@ -42,17 +43,6 @@ class Auto(LinearSolver):
 
     def of_size(self, unknowns: int) -> list[LinearSolver]:
         """The linear solvers for a matrix of so many unknowns, the first choice first."""
-        installed = [kind for kind in FASTEST if kind.absent is None]
-        return [kind() for kind in (installed if unknowns > SMALL else installed[-1:])]
-
-    def for_one_matrix(self) -> LinearSolver:
-        """The same choice, each without trials."""
-        return AutoOnce(refinement=self.refinement)
-
-
-class AutoOnce(Auto):
-    """`Auto` for matrices that are factorised once."""
-
-    def of_size(self, unknowns: int) -> list[LinearSolver]:
-        """The linear solvers for a matrix of so many unknowns, without trials."""
-        return [linear.for_one_matrix() for linear in super().of_size(unknowns)]
+        if unknowns <= SMALL:
+            return [SuperLU(ordering="colamd")]
+        return [kind().for_one_matrix() for kind in FASTEST if kind.absent is None]
