@@ -17,7 +17,6 @@ from rich.table import Table as RichTable
 
 from nlsolve.contracts.status import Status
 from nlsolve.flow.validity import LIMITS
-from nlsolve.registry.registry import PluginRow
 from nlsolve.results.frames import json_rows, rows_of
 from nlsolve.results.verdicts import doubt, number, status_of
 from nlsolve.running.retry import is_final
@@ -126,16 +125,6 @@ def print_endings(question: str, runs: pd.DataFrame, by: list[str]) -> None:
     print_frame(question, runs.reindex(columns=["case", *by, "status", "message"]))
 
 
-def print_plugins(rows: list[PluginRow]) -> None:
-    """Print a table of what is installed, on standard output."""
-    table = RichTable()
-    for heading in ("noun", "kind", "from", "parameters"):
-        table.add_column(heading, overflow="fold")
-    for row in rows:
-        table.add_row(row.noun, row.kind, escape(row.source), escape(_parameters(row)))
-    stdout().print(table)
-
-
 def say_endings(results: Results) -> None:
     """Say how many cases ended how, with the message of one case of each ending that is no convergence, and one of
     the doubts that no audit explains."""
@@ -189,10 +178,3 @@ def left_out(runs: pd.DataFrame) -> list[str]:
         if over or (limit.always and len(values)):
             lines.append(f"  {name.removeprefix('audit.').replace('_', ' '):<23} {values.max():<8.2g}{advice}".rstrip())
     return ["What the scenes left out, at its largest:", *lines] if lines else []
-
-
-def _parameters(row: PluginRow) -> str:
-    """The parameters of a kind, one on a line, or the reason why it cannot be used."""
-    if row.failure is not None:
-        return row.failure
-    return "\n".join(f"{p.name}: {p.type} = {p.default}  {p.description}" for p in row.parameters)

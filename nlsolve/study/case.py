@@ -20,7 +20,7 @@ from nlsolve.contracts.rules.refresh import RefreshRule
 from nlsolve.contracts.scene import Misfit, Scene, Section
 from nlsolve.registry.component_tables import ComponentTable, class_name
 from nlsolve.registry.problems import ABSENT, Problem, problems_in, unknown
-from nlsolve.registry.registry import CONTRACTS, PluginRow, Registry, parameters_of
+from nlsolve.registry.registry import CONTRACTS, PluginRow, Registry, meaning_of, parameters_of
 from nlsolve.results.parameters import names_settings
 from nlsolve.solving.stopping import Budget, StoppingTest
 from nlsolve.study.known_parts import KnownPart, KnownParts, keys_of
@@ -264,6 +264,7 @@ def section_rows(registry: Registry) -> list[PluginRow]:
             "",
             f"nlsolve, for {'every scene' if len(askers[name]) == len(scenes) else ', '.join(askers[name])}",
             parameters_of(section.contract),
+            meaning=meaning_of(section.contract),
         )
         for name, section in found.items()
         if name in askers and section.contract not in CONTRACTS.values()
