@@ -12,6 +12,7 @@ from pydantic_core import to_jsonable_python
 from rich.console import Console
 
 from nlsolve.cli.endings import ExitCode, ending
+from nlsolve.cli.examples import examples
 from nlsolve.cli.folders import folders
 from nlsolve.cli.options import (
     Disabled,
@@ -245,6 +246,7 @@ def statuses(words: list[str]) -> list[Status]:
     return [Status.of(word) for word in words]
 
 
+app.command()(examples)
 app.command()(plugins)
 app.command()(check)
 app.command()(new)

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import shutil
+import textwrap
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
@@ -33,6 +35,10 @@ UNFOLDED = 400
 """Characters a line may have in a file or a pipe."""
 
 
+WIDEST = 110
+"""Letters of a line of text."""
+
+
 def say(sentence: str) -> None:
     """Print a line on standard error."""
     typer.echo(sentence, err=True)
@@ -54,6 +60,19 @@ def stdout() -> Console:
     """Standard output; tables are not folded when it is a file or a pipe."""
     console = Console()
     return console if console.is_terminal else Console(width=UNFOLDED)
+
+
+def folded(start: str, text: str) -> list[str]:
+    """A text as lines: the first after `start`, the others below its first letter."""
+    width = max(40, min(shutil.get_terminal_size((WIDEST, 1)).columns, WIDEST))
+    return textwrap.wrap(
+        text,
+        width,
+        initial_indent=start,
+        subsequent_indent=" " * len(start),
+        break_on_hyphens=False,
+        break_long_words=False,
+    )
 
 
 def print_frame(title: str, frame: pd.DataFrame) -> None:

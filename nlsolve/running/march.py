@@ -65,7 +65,8 @@ class March:
         return np.sum([weight * self._at(k, places) for k, weight in ends if weight], axis=0)
 
     def fields(self, time: float) -> pd.DataFrame:
-        """One row for each node at the end of the increment nearest to `time` [s], with the columns of `fields`.
+        """One row for each node at the end of the increment nearest to `time` [s], with the columns of `fields`; without
+        the pressure, which a march does not keep.
 
         Raises InputError for a time that was not reached.
         """

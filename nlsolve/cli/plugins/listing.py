@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import json
-import shutil
-import textwrap
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict
 from typing import Annotated, Any
@@ -16,14 +14,11 @@ from rich.table import Table
 
 from nlsolve.cli.endings import ending
 from nlsolve.cli.options import Disabled, Json, PluginFiles, registry_of
-from nlsolve.cli.printing import stdout
+from nlsolve.cli.printing import folded, stdout
 from nlsolve.registry.contract_version import CONTRACT_VERSION
 from nlsolve.registry.problems import StudyError, did_you_mean
 from nlsolve.registry.registry import CONTRACTS, FIRST_PARTY, QUALIFIED, PluginRow
 from nlsolve.study.case import section_rows
-
-WIDEST = 110
-"""Letters of a line of the page."""
 
 WITH_KINDS = "Sections of a study, and the kinds that are installed; `nlsolve plugins solver newton` tells of one:"
 WITHOUT_KINDS = "Sections without kinds; `nlsolve plugins stop` tells the keys of one:"
@@ -80,11 +75,11 @@ def _page(rows: Sequence[PluginRow]) -> Iterator[str]:
         name = noun
         for source, kinds in _by_source([row for row in usable if row.noun == noun]).items():
             from_whom = "" if source.partition(" ")[0] == FIRST_PARTY else f"from {source}: "
-            yield from _folded(f"  {name:<{width}}", from_whom + ", ".join(kinds))
+            yield from folded(f"  {name:<{width}}", from_whom + ", ".join(kinds))
             name = ""
     yield ""
     yield WITHOUT_KINDS
-    yield from _folded("  ", ", ".join(row.noun for row in usable if not row.kind))
+    yield from folded("  ", ", ".join(row.noun for row in usable if not row.kind))
     yield ""
     yield f"Version {CONTRACT_VERSION} of the plugin contract."
     failed = [row for row in rows if row.failure is not None]
@@ -92,7 +87,7 @@ def _page(rows: Sequence[PluginRow]) -> Iterator[str]:
         yield ""
         yield "What cannot be used here:"
     for row in failed:  # the reason of a kind begins with it
-        yield from _folded("  ", str(row.failure) if row.kind else f"{row.source}: {row.failure}")
+        yield from folded("  ", str(row.failure) if row.kind else f"{row.source}: {row.failure}")
 
 
 def _by_source(rows: Sequence[PluginRow]) -> Mapping[str, list[str]]:
@@ -104,25 +99,12 @@ def _by_source(rows: Sequence[PluginRow]) -> Mapping[str, list[str]]:
     return found
 
 
-def _folded(start: str, text: str) -> list[str]:
-    """A text as lines: the first after `start`, the others below its first letter."""
-    width = max(40, min(shutil.get_terminal_size((WIDEST, 1)).columns, WIDEST))
-    return textwrap.wrap(
-        text,
-        width,
-        initial_indent=start,
-        subsequent_indent=" " * len(start),
-        break_on_hyphens=False,
-        break_long_words=False,
-    )
-
-
 def _print_row(row: PluginRow) -> None:
     """Print what a kind is, where it comes from, and a table of its parameters."""
     typer.echo(" ".join(filter(None, (row.noun, row.kind))) or row.source)
     for text in (row.meaning, f"from {row.source}", row.failure):
         if text:
-            typer.echo("\n".join(_folded("  ", text)))
+            typer.echo("\n".join(folded("  ", text)))
     if row.parameters:
         table = Table(box=None, padding=(0, 2, 0, 2))
         for heading in ("parameter", "default", "type", "meaning"):
