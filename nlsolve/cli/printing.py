@@ -21,8 +21,8 @@ from nlsolve.contracts.status import Status
 from nlsolve.flow.validity import LIMITS
 from nlsolve.results.frames import json_rows, rows_of
 from nlsolve.results.verdicts import doubt, number, status_of
+from nlsolve.running.results import Results
 from nlsolve.running.retry import is_final
-from nlsolve.running.runner import Results
 from nlsolve.running.store.reading import output_file
 from nlsolve.show.tables import Included, Table
 from nlsolve.study.study import Study

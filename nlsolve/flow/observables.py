@@ -155,8 +155,8 @@ def _on_triangles(
 def nodal_fields(
     scene: Geometry, discretizer: Discretizer, flow: Flow, velocity: Array, initial: Cloud, time: float
 ) -> pd.DataFrame:
-    """σ = S − p I, S = 2 μ(ε̄²) ε̇: one row for each node, with its place at t = 0 and now, V, ε̇, μ, S, p, and the exact V
-    (columns of `FIELDS`).
+    """σ = S − p I, S = 2 μ(ε̄²) ε̇: one row for each node, with its place at t = 0 and now, V, ε̇, μ, S, p, and the
+    exact V (columns of `FIELDS`).
 
     ε̇ and p are taken from the strain points and the volume points to the nodes by the discretizer; μ and S are those of
     the law there. p is the pressure with the penalty's part in it, p − λ tr ε̇; NaN without a volumetric term.
