@@ -24,9 +24,9 @@ def names(incomplete: str) -> list[str]:
 def examples(
     name: Annotated[
         str | None,
-        typer.Argument(metavar="[NAME]", help="the study to copy, or all; absent: list them", autocompletion=names),
+        typer.Argument(metavar="NAME", help="the study to copy, or all; absent: list them", autocompletion=names),
     ] = None,
-    folder: Annotated[Path, typer.Argument(metavar="[DIR]", help="where the copy goes")] = Path(),
+    folder: Annotated[Path, typer.Argument(metavar="DIR", help="where the copy goes")] = Path(),
     as_json: Json = False,
 ) -> None:
     """List the studies that ship with nlsolve and the question of each, or copy one of them. No file is overwritten."""

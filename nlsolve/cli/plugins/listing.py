@@ -27,7 +27,7 @@ WITHOUT_KINDS = "Sections without kinds; `nlsolve plugins stop` tells the keys o
 def plugins(
     words: Annotated[
         list[str] | None,
-        typer.Argument(metavar="[SECTION] [KIND]", help="a section, a kind, or both, to be told of in detail"),
+        typer.Argument(metavar="SECTION_OR_KIND", help="a section, a kind, or both: what is told in detail"),
     ] = None,
     plugin: PluginFiles = None,
     disable_plugin: Disabled = None,
