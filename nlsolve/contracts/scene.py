@@ -198,7 +198,8 @@ class Misfit(ValueError):
 
 class Scene(Component, ABC):
     """What is simulated. Its class declares in `sections` what it needs beside `scene` and the sections of every case
-    (linear, solver, refresh, operator, stop, budget); a declaration under one of these names replaces the default.
+    (linear, solver, refresh, operator, stop, budget, record); a declaration under one of these names replaces the
+    default.
 
     class Heat(Scene):
         kind: Literal["heat"] = "heat"

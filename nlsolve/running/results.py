@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,6 +16,7 @@ from nlsolve.registry.problems import StudyError, did_you_mean
 from nlsolve.results.states.exports import dataset, write_vtk
 from nlsolve.results.states.snapshots import case_among, snapshot, state_of, values_at
 from nlsolve.running.portions.portion import FAILED
+from nlsolve.running.store.reading import iterates_in
 from nlsolve.series import Array
 from nlsolve.show.expectations import Finding, judged
 from nlsolve.show.figures import FigureError, FigureSpec, draw
@@ -35,6 +37,7 @@ class Results:
     folder : the results folder; None if the results are in memory only.
     notes : one sentence for each table or figure that could not be shown, with the reason, and for each thing that was
         done otherwise than asked.
+    recorded : case -> its iterates, of results in memory; those in a folder are read when they are asked for.
     """
 
     study: Study
@@ -43,6 +46,7 @@ class Results:
     fields: pd.DataFrame
     folder: Path | None = None
     notes: tuple[str, ...] = ()
+    recorded: Mapping[str, pd.DataFrame] = field(default_factory=dict)
 
     @property
     def crashed(self) -> int:
@@ -88,6 +92,19 @@ class Results:
         Raises StudyError for a case that is not among the results, or has left no state.
         """
         return state_of(self.fields, self._case(case))
+
+    def iterates(self, case: str | int) -> Array:
+        """The states (K, U) of the K rows of `steps` of a case, which a study asks for with `record.iterates = true`.
+
+        Raises StudyError for a case that is not among the results, and where its iterates were not recorded.
+        """
+        chosen = self._case(case)
+        found = self.recorded.get(chosen, pd.DataFrame()) if self.folder is None else iterates_in(self.folder, chosen)
+        if found.empty:
+            raise StudyError(
+                f"case {chosen}: its iterates were not recorded: run the study with record = {{ iterates = true }}"
+            )
+        return found["value"].to_numpy(float).reshape(int((self.steps["case"] == chosen).sum()), -1)
 
     def plot(self, kind: str, **keys: Any) -> plotting.Figure:
         """A figure of these results: one that the study declares, by its name, or a new one of a kind, with the keys

@@ -99,11 +99,13 @@ def run(
         turns: Turns = ExclusiveTurns(study, store, chosen, counted)
     else:
         turns = Turns(study, store, chosen)
-    frames = _merged(study, _taken(turns, chosen_engine, tell))
+    parts = _taken(turns, chosen_engine, tell)
+    frames = _merged(study, parts)
     told = (*(counter.notes if counter is not None else ()), *chosen_engine.notes)
     notes = (*told, *_unfinished(len(frames.runs), len(study.cases), bool(study.expectations)))
     if store is None:
-        return Results(study, frames.runs, frames.steps, frames.fields, notes=notes)
+        recorded = {case: part.iterates for case, part in parts.items() if len(part.iterates)}
+        return Results(study, frames.runs, frames.steps, frames.fields, None, notes, recorded)
     notes += _show(store, study, frames)
     store.mark_shown(notes)
     return Results(study, frames.runs, frames.steps, frames.fields, store.folder, notes)

@@ -15,6 +15,7 @@ from pydantic_core import PydanticSerializationError, to_jsonable_python
 from nlsolve.contracts.component import Component
 from nlsolve.contracts.linear_solver import LinearSolver
 from nlsolve.contracts.nonlinear_solver import NonlinearSolver
+from nlsolve.contracts.recording import IterateRecording
 from nlsolve.contracts.rules.operator import IterationOperator
 from nlsolve.contracts.rules.refresh import RefreshRule
 from nlsolve.contracts.scene import Misfit, Scene, Section
@@ -34,6 +35,7 @@ COMMON: Mapping[str, Section] = {
     "operator": Section(IterationOperator),
     "stop": Section(StoppingTest),
     "budget": Section(Budget),
+    "record": Section(IterateRecording),
     "limits": Section(Limits),
 }
 """The sections of every case, besides `scene` and those that the scene's class declares."""

@@ -11,7 +11,7 @@ from typing import Any
 
 from pydantic import BaseModel
 
-from nlsolve.contracts.component import NAMES_A_FILE
+from nlsolve.contracts.component import NAMES_A_FILE, Component
 from nlsolve.study.sweeps import Document, leaves
 
 Key = tuple[type, str, str]
@@ -23,7 +23,7 @@ class KnownPart:
     """The component of one section.
 
     component : None where the section has none.
-    text : its fields as JSON, keys in order.
+    text : its fields as JSON, keys in order, but for incidental ones.
     parameters : its fields under dotted names, lists as JSON text.
     classes, files : the class and the files of each component at any depth.
     """
@@ -41,7 +41,10 @@ class KnownPart:
         parameters = {
             dotted: json.dumps(value) if isinstance(value, list | dict) else value for dotted, value in leaves(flat)
         }
-        text = json.dumps(plain, sort_keys=True, separators=(",", ":"))
+        telling = plain
+        if isinstance(component, Component) and isinstance(plain, dict):
+            telling = {key: value for key, value in plain.items() if key not in component.incidental}
+        text = json.dumps(telling, sort_keys=True, separators=(",", ":"))
         return cls(component, text, parameters, classes_of(component), files_read(component))
 
 

@@ -187,3 +187,45 @@ def test_a_long_frame_shows_its_ends_in_a_notebook():
     assert page.count("<tr") < 70
     assert page.startswith("<h4>&lt;i&gt;</h4>")
     assert "a&lt;" in page
+
+
+def test_iterates_are_recorded_on_request_in_memory_and_in_a_folder(tmp_path):
+    asked = {**BRATU, "record": {"iterates": True}}
+    in_memory = nlsolve.run(asked)
+    u = in_memory.iterates(0)
+    assert u.shape == (len(in_memory.steps), in_memory.runs["unknowns"][0])
+    np.testing.assert_array_equal(u[-1], in_memory.state(0))
+    differences = in_memory.steps["difference"].to_numpy()[1:]
+    assert (np.diff(np.linalg.norm(np.diff(u, axis=0), axis=1)) < 0.0).all()
+    assert np.isfinite(differences).all()
+    problem = in_memory.study.cases[0].parts.scene.equations()
+    norms = [np.linalg.norm(problem.residual(state)) for state in u]
+    np.testing.assert_allclose(norms, in_memory.steps["residual_absolute"], rtol=1e-9, atol=1e-14)
+    first = nlsolve.run(BRATU, tmp_path)
+    with pytest.raises(
+        nlsolve.StudyError, match=r"its iterates were not recorded: run the study with record = \{ iter"
+    ):
+        first.iterates(0)
+    told = []
+    again = nlsolve.run(asked, tmp_path, listen=told.append)
+    assert not any(event.resumed for event in told), "iterates that are not there are computed"
+    assert list(again.runs["case"]) == list(first.runs["case"]), "they do not tell cases apart"
+    np.testing.assert_array_equal(again.iterates(0), u)
+    np.testing.assert_array_equal(nlsolve.load(tmp_path).iterates(0), u)
+    told.clear()
+    for study in (asked, BRATU):
+        assert nlsolve.run(study, tmp_path, listen=told.append).iterates(0).shape == u.shape
+    assert all(event.resumed for event in told), "a case with iterates serves a study that asks for none"
+
+
+def test_the_iterates_of_a_march_are_the_states_of_its_steps(couette):
+    asked = {
+        **COUETTE,
+        "scene": {"kind": "couette", "nodes": {"kind": "rings", "spacing": 0.75}},
+        "time": {"horizon": 2e-4, "increment": 1e-4},
+        "physics": {"inertia": True},
+        "record": {"iterates": True},
+    }
+    results = nlsolve.run({key: value for key, value in asked.items() if key != "figure"}, isolation="none")
+    assert results.iterates(0).shape == (len(results.steps), results.runs["unknowns"][0])
+    assert set(results.steps["increment"]) == {1, 2}
