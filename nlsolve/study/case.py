@@ -108,13 +108,20 @@ class Composer:
         self._holds_instances = bool(given)
         for scene in (*registry.classes(Scene.noun).values(), *given):
             if issubclass(scene, Scene):
-                self.all_sections |= sections_of(scene)
-        self.all_sections |= COMMON
+                self._add_sections(sections_of(scene))
+        self._add_sections(COMMON)
 
     @property
     def sections(self) -> tuple[str, ...]:
         """Names of the sections that cases of any known scene may have; only their parameters can be swept."""
         return (Scene.noun, *self.all_sections)
+
+    def _add_sections(self, sections: Mapping[str, Section]) -> None:
+        """Take up sections; of two with one name that whose component has all keys of the other, or else the last."""
+        for name, section in sections.items():
+            known = self.all_sections.setdefault(name, section)
+            if known.contract is section.contract or not issubclass(known.contract, section.contract):
+                self.all_sections[name] = section
 
     def case(self, document: Document, points: Sequence[Point]) -> Case:
         """The case of a document to which the values of `points`, one of each sweep, are assigned. Raises Invalid."""

@@ -41,10 +41,7 @@ class KnownPart:
         parameters = {
             dotted: json.dumps(value) if isinstance(value, list | dict) else value for dotted, value in leaves(flat)
         }
-        telling = plain
-        if isinstance(component, Component) and isinstance(plain, dict):
-            telling = {key: value for key, value in plain.items() if key not in component.incidental}
-        text = json.dumps(telling, sort_keys=True, separators=(",", ":"))
+        text = json.dumps(_telling(component, plain), sort_keys=True, separators=(",", ":"))
         return cls(component, text, parameters, classes_of(component), files_read(component))
 
 
@@ -78,6 +75,14 @@ def keys_of(document: Document, names: Iterable[str]) -> dict[str, str] | None:
 
 
 _written = json.JSONEncoder(sort_keys=True).encode
+
+
+def _telling(component: Any, plain: Any) -> Any:
+    """The fields of a component, as JSON values, that tell cases apart: all but incidental ones, at any depth."""
+    if not (isinstance(component, Component) and isinstance(plain, dict)):
+        return plain
+    kept = {name: value for name, value in plain.items() if name not in component.incidental}
+    return {name: _telling(getattr(component, name, None), value) for name, value in kept.items()}
 
 
 def classes_of(value: Any) -> frozenset[type]:

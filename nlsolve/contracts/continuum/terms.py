@@ -133,7 +133,7 @@ class NodeMotion(Component):
 
 
 class Recording(IterateRecording):
-    """What is recorded of a flow beside its last state."""
+    """What is recorded of a case beside its last state; `times` and `probe` are of flows only."""
 
     times: tuple[Annotated[float, Field(ge=0)], ...] = Field(
         (), description="times at which the fields are recorded, besides the last [s]"
