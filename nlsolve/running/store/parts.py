@@ -122,6 +122,8 @@ class Parts:
 
     def iterates(self, entry: Entry) -> pd.DataFrame:
         """The iterates of a part; no rows where they were not recorded, or are damaged."""
+        if "iterates" not in entry.frames:
+            return pd.DataFrame()
         try:
             return pd.read_parquet(self._frame(entry.identity.key, "iterates"))
         except (OSError, ValueError, ArrowException):
