@@ -58,8 +58,8 @@ def say_excluded(study: Study) -> None:
 
 def stdout() -> Console:
     """Standard output; tables are not folded when it is a file or a pipe."""
-    console = Console()
-    return console if console.is_terminal else Console(width=UNFOLDED)
+    console = Console(emoji=False)  # a qualified kind between colons is no emoji
+    return console if console.is_terminal else Console(width=UNFOLDED, emoji=False)
 
 
 def folded(start: str, text: str) -> list[str]:

@@ -39,13 +39,13 @@ class StoredState(Component):
 
     results: str = Field(min_length=1, description="a results folder, relative to the folder the study is run in")
     case: str = Field(min_length=1, description="identity of a case in it, from the column `case` of its results")
-    file: InputFile = Field("", description="the file of that state, which the two lead to: leave it out")
+    file: InputFile = Field("", description="the file of that state, which follows from the two: leave it out")
 
     @model_validator(mode="before")
     @classmethod
     def _finds_its_file(cls, given: Any) -> Any:
-        if not (isinstance(given, Mapping) and {"results", "case"} <= given.keys() and not given.get("file")):
-            return given
+        if not (isinstance(given, Mapping) and {"results", "case"} <= given.keys()):
+            return given  # told by the mistakes in the fields
         cases = Path(str(given["results"])) / "cases"
         written = sorted(cases.glob(f"{given['case']}-*.fields.parquet"), key=lambda path: path.stat().st_mtime)
         return {**given, "file": str(written[-1] if written else cases / f"{given['case']}.fields.parquet")}
