@@ -122,7 +122,10 @@ def test_a_system_has_no_places(bratu, tmp_path):
 
 def test_a_figure_in_one_call(couette, bratu):
     assert couette.plot("speed").axes[0].get_xlabel()
-    assert couette.plot("field", value="u").axes
+    for value in ("u", "pressure", "viscosity", "sxy"):
+        assert couette.plot("field", value=value).axes
+    assert couette.plot("profile", axis="x", value="pressure").axes
+    assert couette.plot("field", value="viscosity", log=True).axes
     assert couette.plot("cloud").axes
     assert bratu.plot("line", y="residual_norm").axes
 

@@ -5,12 +5,20 @@ N nodes, E edges; `rows` are nodes of `fields` at one time, see `nlsolve.results
 
 from __future__ import annotations
 
+from typing import Literal
+
 import numpy as np
 import pandas as pd
 
 from nlsolve.results.states.triangles import boundaries, outside_material
 from nlsolve.series import Array
 from nlsolve.show import plotting
+
+NodalValue = Literal["u", "v", "exx", "eyy", "exy", "rate", "viscosity", "sxx", "syy", "sxy", "pressure"]
+"""The columns of `fields` that figures show."""
+
+POSITIVE = ("rate", "viscosity")
+"""Those of them that have no sign."""
 
 
 def triangulate(rows: pd.DataFrame, value: Array | None = None) -> plotting.Triangulation:
