@@ -15,7 +15,8 @@ if TYPE_CHECKING:
     from nlsolve.registry.problems import StudyError
     from nlsolve.running.interactive import compare, solve
     from nlsolve.running.march import March, march
-    from nlsolve.running.runner import Event, Results, load, run
+    from nlsolve.running.results import Results
+    from nlsolve.running.runner import Event, load, run
     from nlsolve.running.store.parts import StoreError
     from nlsolve.solving.simulate import Progress
     from nlsolve.study.study import Study
@@ -30,7 +31,7 @@ _HOME = {
     "InputError": "nlsolve.contracts.status",
     "Outcome": "nlsolve.contracts.outcome",
     "Progress": "nlsolve.solving.simulate",
-    "Results": "nlsolve.running.runner",
+    "Results": "nlsolve.running.results",
     "SolveError": "nlsolve.contracts.status",
     "Status": "nlsolve.contracts.status",
     "StoreError": "nlsolve.running.store.parts",

@@ -17,6 +17,7 @@ from nlsolve_solvers import Newton
 
 from nlsolve.contracts.continuum.geometry import Geometry
 from nlsolve.contracts.outcome import Outcome
+from nlsolve.contracts.recording import IterateRecording, SystemStart
 from nlsolve.flow.continuation import Start
 from nlsolve.flow.momentum import Flow
 from nlsolve.plugin import (
@@ -134,3 +135,5 @@ class SystemParts:
     operator: IterationOperator = field(default_factory=TangentHere)
     stop: StoppingTest = field(default_factory=StoppingTest)
     budget: Budget = field(default_factory=Budget)
+    record: IterateRecording = field(default_factory=IterateRecording)
+    start: SystemStart = field(default_factory=SystemStart)

@@ -7,12 +7,13 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+import pandas as pd
 
 from nlsolve.algebra.by_equation import ALLOWED, NEAR, SLOWEST, SUPERLINEAR, ByEquation, Correction
 from nlsolve.contracts.linear_solver import LinearSolver
 from nlsolve.contracts.outcome import Outcome
 from nlsolve.contracts.problem import NonlinearProblem
-from nlsolve.contracts.scene import Simulation, Solve
+from nlsolve.contracts.scene import Simulation, Solve, state_rows
 from nlsolve.contracts.status import Status
 from nlsolve.series import Array
 
@@ -44,10 +45,12 @@ class RootSearch(Simulation):
         self.doubt = ""
         self.root_error = np.nan
         self.sizes = {"unknowns": len(start)}
+        self.reached = np.zeros(0)
 
     def solves(self) -> Generator[Solve, Outcome, Outcome]:
         """Yields the one problem; the status of its outcome tells another root from a known one."""
         outcome = yield Solve(self.problem, self.start)
+        self.reached = outcome.state
         root = self.nearest_root(outcome.state)
         if root is None and outcome.newton_correction <= SETTLED:
             return outcome
@@ -60,6 +63,10 @@ class RootSearch(Simulation):
     def sample(self) -> tuple[NonlinearProblem, Array]:
         """The problem and its start."""
         return self.problem, self.start
+
+    def fields(self) -> pd.DataFrame:
+        """The state that the solve ended at, whatever its ending."""
+        return state_rows(self.reached)
 
     def measured(self, outcome: Outcome) -> Mapping[str, Any]:
         """Distance from the nearest known root, whether J is singular at a root, and the doubt about the state."""

@@ -18,6 +18,7 @@ from nlsolve.algebra.formula import FormulaProblem
 from nlsolve.algebra.root_search import RootSearch
 from nlsolve.contracts.linear_solver import LinearSolver
 from nlsolve.contracts.nonlinear_solver import NonlinearSolver
+from nlsolve.contracts.recording import SystemStart
 from nlsolve.contracts.scene import Entry, Scene, Section
 from nlsolve.series import Array
 
@@ -36,7 +37,10 @@ class System(Scene, ABC):
             return np.array([1.0, 0.5])
     """
 
-    sections: ClassVar[Mapping[str, Section]] = {"solver": Section(NonlinearSolver, {"kind": "robust"})}
+    sections: ClassVar[Mapping[str, Section]] = {
+        "solver": Section(NonlinearSolver, {"kind": "robust"}),
+        "start": Section(SystemStart),
+    }
 
     factor: float = Field(
         1.0, gt=0, description="the standard start times this; a start of zeros becomes one of factors (1: as it is)"
@@ -114,5 +118,8 @@ class System(Scene, ABC):
         return RootSearch(problem, start, linear, self.nearest_root, self.singular)
 
     def simulation(self, parts: Any, entry: Entry) -> RootSearch:
-        """The simulation from `start()`."""
-        return self.search(self.start(), parts.linear, entry)
+        """The simulation from `start()`, or from the stored state that the case names. Raises SolveError where there is
+        no such state.
+        """
+        own, stored = self.start(), parts.start.stored
+        return self.search(own if stored is None else stored.unknowns(len(own)), parts.linear, entry)

@@ -12,6 +12,7 @@ from pydantic_core import to_jsonable_python
 from rich.console import Console
 
 from nlsolve.cli.endings import ExitCode, ending
+from nlsolve.cli.examples import examples
 from nlsolve.cli.folders import folders
 from nlsolve.cli.options import (
     Disabled,
@@ -32,12 +33,12 @@ from nlsolve.cli.options import (
     registry_of,
 )
 from nlsolve.cli.plugins.check import check
+from nlsolve.cli.plugins.listing import plugins
 from nlsolve.cli.plugins.new import new
 from nlsolve.cli.printing import (
     count,
     left_out,
     print_frame,
-    print_plugins,
     print_results,
     say,
     say_endings,
@@ -51,7 +52,6 @@ from nlsolve.results.frames import json_rows
 from nlsolve.running.diagnose import diagnose as diagnostics_of
 from nlsolve.running.planning.plan import plan_of
 from nlsolve.running.runner import run as run_study
-from nlsolve.study.case import section_rows
 from nlsolve.study.keys.schema import study_schema
 
 app = typer.Typer(
@@ -62,7 +62,10 @@ app = typer.Typer(
 @app.callback()
 def common(
     _version: Annotated[
-        bool, typer.Option("--version", is_eager=True, callback=lambda asked: show_version(asked), help="and exit")
+        bool,
+        typer.Option(
+            "--version", is_eager=True, callback=lambda asked: show_version(asked), help="print the version and exit"
+        ),
     ] = False,
 ) -> None:
     """Compare nonlinear solution strategies on equal terms."""
@@ -227,18 +230,6 @@ def diagnose(
 
 
 @app.command()
-def plugins(plugin: PluginFiles = None, disable_plugin: Disabled = None, as_json: Json = False) -> None:
-    """List the sections of a study and what is installed for them, with parameters, and what failed to load."""
-    with ending():
-        registry = registry_of(plugin, disable_plugin)
-    rows = [*section_rows(registry), *registry.plugins()]
-    if as_json:
-        typer.echo(json.dumps(to_jsonable_python([asdict(row) for row in rows])))
-        return
-    print_plugins(rows)
-
-
-@app.command()
 def schema(plugin: PluginFiles = None, disable_plugin: Disabled = None) -> None:
     """Print the JSON schema of study files, composed from the installed plugins."""
     with ending():
@@ -255,6 +246,8 @@ def statuses(words: list[str]) -> list[Status]:
     return [Status.of(word) for word in words]
 
 
+app.command()(examples)
+app.command()(plugins)
 app.command()(check)
 app.command()(new)
 app.add_typer(folders)

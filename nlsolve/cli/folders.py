@@ -39,7 +39,7 @@ Folder = Annotated[Path, typer.Argument(metavar="DIR", help="a results folder")]
 @folders.command()
 def table(
     folder: Folder,
-    name: Annotated[str | None, typer.Argument(help="one declared table; default: all")] = None,
+    name: Annotated[str | None, typer.Argument(metavar="NAME", help="one declared table; default: all")] = None,
     as_json: Json = False,
     check: Annotated[
         Path | None,

@@ -37,7 +37,9 @@ Only = Annotated[
         "--only", metavar="EXPR", help="run only cases with solver.kind=anm (or a pattern), a status, or a case's id"
     ),
 ]
-Skip = Annotated[list[str] | None, typer.Option("--skip", metavar="EXPR", help="leave these cases out, as --only")]
+Skip = Annotated[
+    list[str] | None, typer.Option("--skip", metavar="EXPR", help="leave out the cases that fit, written as for --only")
+]
 Failed = Annotated[bool, typer.Option("--failed", help="run again only what crashed or was stopped at a limit")]
 Shard = Annotated[
     str | None,

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import shutil
+import textwrap
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
@@ -17,11 +19,10 @@ from rich.table import Table as RichTable
 
 from nlsolve.contracts.status import Status
 from nlsolve.flow.validity import LIMITS
-from nlsolve.registry.registry import PluginRow
 from nlsolve.results.frames import json_rows, rows_of
 from nlsolve.results.verdicts import doubt, number, status_of
+from nlsolve.running.results import Results
 from nlsolve.running.retry import is_final
-from nlsolve.running.runner import Results
 from nlsolve.running.store.reading import output_file
 from nlsolve.show.tables import Included, Table
 from nlsolve.study.study import Study
@@ -32,6 +33,10 @@ columns one letter each is left."""
 
 UNFOLDED = 400
 """Characters a line may have in a file or a pipe."""
+
+
+WIDEST = 110
+"""Letters of a line of text."""
 
 
 def say(sentence: str) -> None:
@@ -53,8 +58,21 @@ def say_excluded(study: Study) -> None:
 
 def stdout() -> Console:
     """Standard output; tables are not folded when it is a file or a pipe."""
-    console = Console()
-    return console if console.is_terminal else Console(width=UNFOLDED)
+    console = Console(emoji=False)  # a qualified kind between colons is no emoji
+    return console if console.is_terminal else Console(width=UNFOLDED, emoji=False)
+
+
+def folded(start: str, text: str) -> list[str]:
+    """A text as lines: the first after `start`, the others below its first letter."""
+    width = max(40, min(shutil.get_terminal_size((WIDEST, 1)).columns, WIDEST))
+    return textwrap.wrap(
+        text,
+        width,
+        initial_indent=start,
+        subsequent_indent=" " * len(start),
+        break_on_hyphens=False,
+        break_long_words=False,
+    )
 
 
 def print_frame(title: str, frame: pd.DataFrame) -> None:
@@ -126,16 +144,6 @@ def print_endings(question: str, runs: pd.DataFrame, by: list[str]) -> None:
     print_frame(question, runs.reindex(columns=["case", *by, "status", "message"]))
 
 
-def print_plugins(rows: list[PluginRow]) -> None:
-    """Print a table of what is installed, on standard output."""
-    table = RichTable()
-    for heading in ("noun", "kind", "from", "parameters"):
-        table.add_column(heading, overflow="fold")
-    for row in rows:
-        table.add_row(row.noun, row.kind, escape(row.source), escape(_parameters(row)))
-    stdout().print(table)
-
-
 def say_endings(results: Results) -> None:
     """Say how many cases ended how, with the message of one case of each ending that is no convergence, and one of
     the doubts that no audit explains."""
@@ -189,10 +197,3 @@ def left_out(runs: pd.DataFrame) -> list[str]:
         if over or (limit.always and len(values)):
             lines.append(f"  {name.removeprefix('audit.').replace('_', ' '):<23} {values.max():<8.2g}{advice}".rstrip())
     return ["What the scenes left out, at its largest:", *lines] if lines else []
-
-
-def _parameters(row: PluginRow) -> str:
-    """The parameters of a kind, one on a line, or the reason why it cannot be used."""
-    if row.failure is not None:
-        return row.failure
-    return "\n".join(f"{p.name}: {p.type} = {p.default}  {p.description}" for p in row.parameters)

@@ -37,6 +37,8 @@ class Component(BaseModel):
 
     noun: ClassVar[str] = "component"
     """What the contract is called in a study file: "law", "scene", …; set by each contract."""
+    incidental: ClassVar[frozenset[str]] = frozenset()
+    """Fields that change nothing that a case computes, and so do not tell cases apart."""
     default_kind: ClassVar[str | None] = None
     """The kind used when a study names none, set by each contract; None when a study must name one."""
 

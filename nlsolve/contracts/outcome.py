@@ -8,6 +8,7 @@ from typing import Any
 
 import pandas as pd
 
+from nlsolve.contracts import notebook
 from nlsolve.contracts.status import Status
 from nlsolve.series import Array
 
@@ -73,9 +74,16 @@ class Outcome:
         return pd.DataFrame(list(self.rows))
 
     def __repr__(self) -> str:
+        return "\n".join(f"{name:<10}  {text}" for name, text in self._told().items())
+
+    def _repr_html_(self) -> str:
+        """What a notebook shows: status, residual, work, seconds, and a short state."""
+        return notebook.facts(self._told())
+
+    def _told(self) -> dict[str, str]:
         counts = ", ".join(_counted(number, name) for name, number in self.counts.items() if number)
         seconds = ", ".join(f"{_words(kind)} {value:.2g}" for kind, value in self.seconds.items() if value > 0.0)
-        lines = {
+        return {
             "status": f"{self.status.word}: {self.message}",
             "residual": f"{self.residual_norm:.2g}",
             "iterations": f"{self.iterations}",
@@ -83,7 +91,6 @@ class Outcome:
             "seconds": f"{sum(self.seconds.values()):.2g}" + (f": {seconds}" if seconds else ""),
             "state": _entries(self.state),
         }
-        return "\n".join(f"{name:<10}  {text}" for name, text in lines.items())
 
 
 def _words(name: str) -> str:

@@ -17,6 +17,7 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any, ClassVar, Protocol
 
+import numpy as np
 import pandas as pd
 
 from nlsolve.contracts.component import Component
@@ -125,6 +126,11 @@ class Simulation(ABC):
         return []
 
 
+def state_rows(state: Array) -> pd.DataFrame:
+    """A row of `fields` for each unknown of a state (U,)."""
+    return pd.DataFrame({"unknown": np.arange(len(state)), "value": state})
+
+
 class SingleSolve(Simulation):
     """The simulation of one problem: R(u) = 0 from `start` (U,).
 
@@ -139,10 +145,17 @@ class SingleSolve(Simulation):
     ) -> None:
         self.problem, self.start, self.measure = problem, start, measure
         self.sizes = {"unknowns": len(start)}
+        self.reached = np.zeros(0)
 
     def solves(self) -> Generator[Solve, Outcome, Outcome]:
         """Yields the one problem; its outcome is that of the case."""
-        return (yield Solve(self.problem, self.start))
+        outcome = yield Solve(self.problem, self.start)
+        self.reached = outcome.state
+        return outcome
+
+    def fields(self) -> pd.DataFrame:
+        """The state that the solve ended at."""
+        return state_rows(self.reached)
 
     def sample(self) -> tuple[NonlinearProblem, Array]:
         """The problem and its start."""
@@ -185,7 +198,8 @@ class Misfit(ValueError):
 
 class Scene(Component, ABC):
     """What is simulated. Its class declares in `sections` what it needs beside `scene` and the sections of every case
-    (linear, solver, refresh, operator, stop, budget); a declaration under one of these names replaces the default.
+    (linear, solver, refresh, operator, stop, budget, record); a declaration under one of these names replaces the
+    default.
 
     class Heat(Scene):
         kind: Literal["heat"] = "heat"

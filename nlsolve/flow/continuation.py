@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Generator
 from dataclasses import dataclass, replace
-from typing import ClassVar, Literal, Self
+from typing import Literal, Self
 
 import numpy as np
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
-from nlsolve.contracts.component import Component
 from nlsolve.contracts.continuum.law import ConstitutiveLaw
 from nlsolve.contracts.outcome import Outcome
+from nlsolve.contracts.recording import SystemStart
 from nlsolve.contracts.scene import Preparation, Solve
 from nlsolve.contracts.status import Status
 from nlsolve.flow.momentum import Flow
@@ -27,6 +27,9 @@ REST = "rest"
 CONTINUATION = ("by", "values", "adaptive", "smallest", "iterations", "tolerance", "solver")
 """The fields of a `Start` that say how its stages are solved; a march from rest has none."""
 
+LED_BY = 5
+"""So many of them, the first ones, lead from stage to stage; with a stored state there is one stage."""
+
 EASY = 8  # a stage solved in so many iterations or fewer was easy: the next step is doubled
 
 
@@ -39,7 +42,7 @@ class Stage:
     value: float
 
 
-class Start(Component):
+class Start(SystemStart):
     """How the first state is reached: a stage is solved for each of `values` that is easier than the target, in order,
     and then the target itself. These are values of `by`, a field by which the law is continued, or "load", which is
     easier when it is smaller.
@@ -52,11 +55,13 @@ class Start(Component):
     A march may also begin at rest: V = 0 inside at t = 0, on the boundary what is prescribed there, and nothing is
     solved before the first increment. What that costs is counted in the march; all `start_…` columns are 0.
 
+    With a stored state there is no continuation: the target is solved from that state, carried to the nodes of this
+    case linearly where they are others; by the method of the case in a steady scene, by `solver` before a march. A
+    system of equations has no other key than `stored`, in place of its own start.
+
     A perturbation moves the guess that each solve by the method of the case begins with: in a steady scene the state
     after the continuation (or rest), in a march the state that each increment begins with. The equations stay the same.
     """
-
-    noun: ClassVar[str] = "start"
 
     at: Literal["state", "rest"] = Field(
         "state",
@@ -86,13 +91,14 @@ class Start(Component):
 
     @model_validator(mode="after")
     def _rest_has_no_continuation(self) -> Self:
-        if self.at == REST:
+        if self.at == REST and self.stored is not None:
+            raise ValueError('stored: a march from rest begins with V = 0: leave it out, or set at = "state"')
+        if self.at == REST or self.stored is not None:
             usual = Start()
-            for name in CONTINUATION:
+            begun, way_out = ("rest", 'set at = "state"') if self.at == REST else ("a stored state", "leave stored out")
+            for name in CONTINUATION[: None if self.at == REST else LED_BY]:
                 if getattr(self, name) != getattr(usual, name):
-                    raise ValueError(
-                        f'{name}: a march from rest has no continuation: leave it out, or set at = "state"'
-                    )
+                    raise ValueError(f"{name}: a march from {begun} has no continuation: leave it out, or {way_out}")
         return self
 
     def disturbed(self, flow: Flow, u: Array, increment: int) -> Array:
@@ -103,12 +109,15 @@ class Start(Component):
         return u + self.perturbation * np.linalg.norm(flow.velocity(u)) / np.linalg.norm(g) * g
 
     def stages(self, law: ConstitutiveLaw) -> list[Stage]:
-        """The stages of `values`, in order, and the target last; none for a march from rest.
+        """The stages of `values`, in order, and the target last; from a stored state the target alone, for a march from
+        rest none.
 
         Raises ValueError when the law refuses the values.
         """
         if self.at == REST:
             return []
+        if self.stored is not None:
+            return [Stage(law, 1.0, 1.0)]
         if self.by == LOAD:
             path = (*self.values, 1.0)
             if min(path) <= 0.0 or (np.diff(path) <= 0.0).any():

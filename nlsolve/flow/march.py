@@ -85,6 +85,10 @@ class FlowSimulation(Simulation):
         cloud = self.cloud()
         self.settle(cloud)
         self.state.begin(cloud)
+        if self.parts.start.stored is not None:
+            nodes, velocity = self.parts.start.stored.velocity()
+            moved = nodes.shape != cloud.nodes.shape or not np.allclose(nodes, cloud.nodes)
+            self.state.guess = self.state.velocity = carried(Cloud(nodes, {}), cloud)(velocity) if moved else velocity
 
     def settle(self, cloud: Cloud) -> None:
         """Take `cloud` as that of t = 0, and find the node of the probe."""

@@ -9,7 +9,7 @@ import scipy
 from nlsolve.contracts.continuum.cloud import Cloud, Indices, hat_gradients
 from nlsolve.contracts.continuum.discretizer import Discretizer
 from nlsolve.contracts.continuum.geometry import Geometry
-from nlsolve.contracts.continuum.law import rate_squared
+from nlsolve.contracts.continuum.law import rate_squared, stress
 from nlsolve.contracts.continuum.terms import NodeMotion
 from nlsolve.flow.momentum import Flow
 from nlsolve.series import Array
@@ -155,11 +155,20 @@ def _on_triangles(
 def nodal_fields(
     scene: Geometry, discretizer: Discretizer, flow: Flow, velocity: Array, initial: Cloud, time: float
 ) -> pd.DataFrame:
-    """One row for each node: place at t = 0 and now, velocity, strain rates, exact velocity (columns of `FIELDS`)."""
+    """σ = S − p I, S = 2 μ(ε̄²) ε̇: one row for each node, with its place at t = 0 and now, V, ε̇, μ, S, p, and the
+    exact V (columns of `FIELDS`).
+
+    ε̇ and p are taken from the strain points and the volume points to the nodes by the discretizer; μ and S are those of
+    the law there. p is the pressure with the penalty's part in it, p − λ tr ε̇; NaN without a volumetric term.
+    """
     nodes = flow.cloud.nodes
-    strain_rate = flow.strain_rate(flow.unknowns(velocity))
+    u = flow.unknowns(velocity)
     to_nodes = discretizer.values(flow.operators.strain.points, nodes)
-    exx, eyy, exy = at_nodes = np.stack([to_nodes @ component for component in strain_rate])
+    exx, eyy, exy = rates = np.stack([to_nodes @ component for component in flow.strain_rate(u)])
+    sxx, syy, sxy = stress(flow.law, rates)
+    at_volume_points, pressure = flow.pressure(u), np.full(len(nodes), np.nan)
+    if at_volume_points is not None and flow.operators.volumetric is not None:
+        pressure = discretizer.values(flow.operators.volumetric.points, nodes) @ at_volume_points
     exact = scene.exact(flow.law, nodes, time)
     exact_velocity = np.full_like(nodes, np.nan) if exact is None else exact.velocity
     boundary = np.full(len(nodes), "", dtype=object)
@@ -173,4 +182,6 @@ def nodal_fields(
         (("exact_u", "exact_v"), exact_velocity),
     ):
         columns |= dict(zip(names, pair.T, strict=True))
-    return pd.DataFrame(columns | {"exx": exx, "eyy": eyy, "exy": exy, "rate": np.sqrt(rate_squared(at_nodes))})
+    columns |= {"exx": exx, "eyy": eyy, "exy": exy, "rate": np.sqrt(rate_squared(rates))}
+    columns |= {"viscosity": flow.law.viscosity(rate_squared(rates)), "sxx": sxx, "syy": syy, "sxy": sxy}
+    return pd.DataFrame(columns | {"pressure": pressure})

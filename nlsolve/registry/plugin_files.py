@@ -12,6 +12,7 @@ from types import ModuleType
 
 from nlsolve.contracts.component import Component
 from nlsolve.registry import hookspecs
+from nlsolve.registry.contract_version import unserved
 from nlsolve.registry.probing import fault_of_file, module_of_file, undisturbed
 from nlsolve.registry.problems import StudyError
 from nlsolve.registry.registry import CONTRACTS, Registry, sentence_of
@@ -57,7 +58,7 @@ def load_file(path: Path) -> ModuleType:
     """The module of a file. Its name follows from the name and the text of the file, so that a file is imported once a
     process until it is edited, and objects of its classes can be sent to a process that has loaded the same file.
 
-    Raises StudyError for a file that cannot be imported.
+    Raises StudyError for a file that cannot be imported, or was written for another contract.
     """
     try:
         text = path.read_bytes()
@@ -69,6 +70,9 @@ def load_file(path: Path) -> ModuleType:
         return sys.modules[name]
     if path.suffix not in SOURCE_SUFFIXES:
         raise StudyError(f"the plugin {path} is no Python file: its name should end with .py")
+    reason = unserved(text.decode(errors="replace"))
+    if reason:
+        raise StudyError(f"the plugin {path} cannot be used: {reason}")
     file = path.resolve()
     fault = fault_of_file(file)
     if fault:

@@ -39,6 +39,7 @@ from nlsolve.contracts.rules.refresh import RefreshRule
 from nlsolve.contracts.scene import Scene
 from nlsolve.registry import hookspecs
 from nlsolve.registry.component_tables import ComponentTable, own_class
+from nlsolve.registry.contract_version import text_of, unserved
 from nlsolve.registry.probing import faults_of, undisturbed
 
 CONTRACTS: dict[str, type[Component]] = {
@@ -91,6 +92,7 @@ class PluginRow:
 
     source : distribution, version and module that it comes from.
     failure : why the plugin or the kind cannot be used; None when it can.
+    meaning : the first paragraph of its class's docstring.
     """
 
     noun: str
@@ -98,6 +100,7 @@ class PluginRow:
     source: str
     parameters: tuple[Parameter, ...] = ()
     failure: str | None = None
+    meaning: str = ""
 
 
 @dataclass(frozen=True)
@@ -146,15 +149,20 @@ class Registry:
         return registry
 
     def load(self, entry: EntryPoint) -> None:
-        """Import the plugin of one entry point and register it; a failure becomes a row."""
+        """Import the plugin of one entry point and register it; a failure, or a version of the contract that is not
+        served, becomes a row."""
         source = source_of(entry)
         try:
             with undisturbed():
-                plugin = entry.load()
+                reason = "" if _is_own(entry) else unserved(text_of(entry))
+                plugin = None if reason else entry.load()
         except (Exception, SystemExit) as error:  # a stranger's import may raise anything; the rest must still work
             self._fail(source, f"the plugin {entry.name!r} cannot be imported: {sentence_of(error)}")
         else:
-            self.add(plugin, source)
+            if reason:
+                self._fail(source, f"the plugin {entry.name!r} cannot be used: {reason}")
+            else:
+                self.add(plugin, source)
 
     def add(self, plugin: object, source: str) -> None:
         """Register a module or object with a `nlsolve_components` hook; a failure becomes a row.
@@ -374,7 +382,9 @@ class Registry:
             for offer in offers:
                 name = kind if self._chosen(noun, kind) == [offer] else offer.name
                 failure = self.complaint(noun, name)
-                rows.append(PluginRow(noun, name, offer.source, parameters_of(offer.cls), failure))
+                rows.append(
+                    PluginRow(noun, name, offer.source, parameters_of(offer.cls), failure, meaning_of(offer.cls))
+                )
         return rows + self._failures + self._disabled
 
     @property
@@ -460,6 +470,11 @@ def _check_properties(cls: type[Component]) -> None:
             raise TypeError(f"{cls.__name__}.{name} is a method, and should be a property: write @property above it")
         if inspect.isfunction(promised) and isinstance(given, property):
             raise TypeError(f"{cls.__name__}.{name} is a property, and should be a method: leave @property out")
+
+
+def meaning_of(cls: type[Component]) -> str:
+    """The first paragraph of a class's own docstring, in one line; empty when it has none."""
+    return " ".join(inspect.cleandoc(cls.__doc__ or "").partition("\n\n")[0].split())
 
 
 def parameters_of(cls: type[Component]) -> tuple[Parameter, ...]:

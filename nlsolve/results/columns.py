@@ -417,10 +417,22 @@ FIELDS = _by_name(
     Column("eyy", "strain rate ε̇yy", "1/s", r"$\dot{\varepsilon}_{yy}$"),
     Column("exy", "strain rate ε̇xy", "1/s", r"$\dot{\varepsilon}_{xy}$"),
     Column("rate", "equivalent strain rate ε̄", "1/s", r"$\bar{\varepsilon}$"),
+    Column("viscosity", "viscosity μ(ε̄²) of the law at that rate", "MPa s", r"$\mu$"),
+    Column("sxx", "viscous stress Sxx = 2 μ ε̇xx; the whole stress is σ = S − p I", "MPa", "$S_{xx}$"),
+    Column("syy", "viscous stress Syy = 2 μ ε̇yy", "MPa", "$S_{yy}$"),
+    Column("sxy", "viscous stress Sxy = 2 μ ε̇xy", "MPa", "$S_{xy}$"),
+    Column(
+        "pressure",
+        "pressure, that of the penalty −λ tr ε̇ with it; NaN where the scene is without a penalty",
+        "MPa",
+        "$p$",
+    ),
     Column("exact_u", "exact x velocity; NaN where the scene has none", "mm/s"),
     Column("exact_v", "exact y velocity; NaN where the scene has none", "mm/s"),
+    Column("unknown", "system: number of the unknown, from 0"),
+    Column("value", "system: the unknown in the state that the solve ended at", "", "$u_j$"),
 )
-"""`fields`: a row a node and recorded time."""
+"""`fields`: of a flow a row a node and recorded time, of a system a row an unknown."""
 
 FRAMES: Mapping[str, Mapping[str, Column]] = MappingProxyType({"runs": RUNS, "steps": STEPS, "fields": FIELDS})
 """The columns of each result frame, by its name."""

@@ -6,9 +6,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
+import numpy as np
 import pandas as pd
 
 from nlsolve.results.columns import NOTE, STEPS
+from nlsolve.series import Array
 
 Row = dict[str, Any]
 """A row of a frame, or of a table, by the names of its columns."""
@@ -28,6 +30,7 @@ class Part:
     """The results of one case: its row of `runs`, its rows of `steps` and of `fields`.
 
     environment : what it was computed with, such as versions and processor; its row has the digest of it.
+    iterates : the state of each row of `steps`, where the study asks for them; see `iterates_frame`.
     output : what the case has printed, cut in the middle where it is long; empty where nobody has listened.
     rounds : of a case in the exclusive lane, what each round has measured: columns of `runs`.
     startup : how long the case has waited for a process of its own that had to be started for it [s].
@@ -37,6 +40,7 @@ class Part:
     steps: pd.DataFrame
     fields: pd.DataFrame
     environment: Mapping[str, str] = field(default_factory=dict)
+    iterates: pd.DataFrame = field(default_factory=pd.DataFrame)
     output: str = ""
     rounds: tuple[Row, ...] = ()
     startup: float = 0.0
@@ -47,6 +51,13 @@ def steps_frame(rows: Sequence[Mapping[str, Any]]) -> pd.DataFrame:
     documented = [name for name in STEPS if name != "case"]
     notes = dict.fromkeys(name for row in rows for name in row if name.startswith(NOTE))
     return pd.DataFrame(rows, columns=[*documented, *notes])
+
+
+def iterates_frame(states: Sequence[Array]) -> pd.DataFrame:
+    """One column `value` with the entries of K states (U,), state after state; the number of states is K of the rows of
+    `steps`.
+    """
+    return pd.DataFrame({"value": np.concatenate(states)}) if states else pd.DataFrame()
 
 
 def rows_of(frame: pd.DataFrame) -> list[Row]:

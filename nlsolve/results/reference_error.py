@@ -20,7 +20,8 @@ def with_reference_errors(frames: Frames, references: Mapping[str, str]) -> Fram
     """
     if not references:
         return frames
-    last = {str(case): _at_the_end(part) for case, part in frames.fields.groupby("case", sort=False)}
+    flows = frames.fields.dropna(subset="time") if "time" in frames.fields else frames.fields.iloc[:0]
+    last = {str(case): _at_the_end(part) for case, part in flows.groupby("case", sort=False)}
     errors = [_error(last.get(case), last.get(references.get(case, ""))) for case in frames.runs["case"]]
     return Frames(frames.runs.assign(reference_error=errors), frames.steps, frames.fields)
 

@@ -12,6 +12,7 @@ import pandas as pd
 import scipy
 from numpy.typing import ArrayLike
 
+from nlsolve.contracts import notebook
 from nlsolve.contracts.outcome import Outcome
 from nlsolve.contracts.scene import Simulation
 from nlsolve.contracts.status import InputError
@@ -28,7 +29,7 @@ from nlsolve.solving.simulate import Progress, run_case
 from nlsolve.study.study import Study
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class March:
     """The states of a flow at the ends of its increments, or the one state of a steady flow.
 
@@ -48,6 +49,20 @@ class March:
     velocities: Array
     parts: FlowParts
 
+    def __repr__(self) -> str:
+        return "\n".join(f"{name:<10}  {text}" for name, text in self._told().items())
+
+    def _repr_html_(self) -> str:
+        """What a notebook shows: how the march ended, its times and its nodes."""
+        return notebook.facts(self._told())
+
+    def _told(self) -> dict[str, str]:
+        reached = f"0 to {self.times[-1]:g} s, {len(self.times)} states" if len(self.times) else "none"
+        nodes = str(self.nodes.shape[1]) if len(self.times) else "none"
+        work = f"{self.row['tangents']} tangents, {self.row['factorizations']} factorizations"
+        status = f"{self.outcome.status.word}: {self.outcome.message}"
+        return {"status": status, "times": reached, "nodes": nodes, "work": work}
+
     def velocity(self, points: ArrayLike, time: float) -> Array:
         """V at points (T, 2) [mm] and a time [s], shape (T, 2) [mm/s]; NaN outside the material.
 
@@ -65,7 +80,8 @@ class March:
         return np.sum([weight * self._at(k, places) for k, weight in ends if weight], axis=0)
 
     def fields(self, time: float) -> pd.DataFrame:
-        """One row for each node at the end of the increment nearest to `time` [s], with the columns of `fields`.
+        """One row for each node at the end of the increment nearest to `time` [s], with the columns of `fields`;
+        without the pressure, which a march does not keep.
 
         Raises InputError for a time that was not reached.
         """

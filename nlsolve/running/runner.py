@@ -6,7 +6,7 @@ import shlex
 import time
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from contextlib import closing
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from datetime import date
 from importlib import import_module
 from pathlib import Path
@@ -16,73 +16,26 @@ import pandas as pd
 
 from nlsolve.contracts.status import Status
 from nlsolve.registry.plugin_files import Plugin, with_plugins
-from nlsolve.registry.problems import StudyError, did_you_mean
+from nlsolve.registry.problems import StudyError
 from nlsolve.registry.registry import load_registry
 from nlsolve.results.frames import Frames, Part, rows_of
 from nlsolve.running.engines.choice import counter_for, engine_for
 from nlsolve.running.engines.engine import Engine, Event, Listener
 from nlsolve.running.engines.execution import Debugger
-from nlsolve.running.portions.portion import FAILED, portion_of
+from nlsolve.running.portions.portion import portion_of
+from nlsolve.running.results import Results
 from nlsolve.running.store.parts import Parts, StoreError, merge
 from nlsolve.running.store.reading import completed, description_of, environments_of, finished, of_one_source
 from nlsolve.running.store.store import Store
 from nlsolve.running.timing.exclusive import CountingTurns, ExclusiveTurns
 from nlsolve.running.turns import Turns
-from nlsolve.show.expectations import Finding, judged
 from nlsolve.show.figures import FigureError, write
-from nlsolve.show.tables import PREAMBLE, PREAMBLE_FILE, Provenance, Table, build, built
+from nlsolve.show.tables import PREAMBLE, PREAMBLE_FILE, Provenance, built
 from nlsolve.study.study import Study
 from nlsolve.study.timing import Timing
 
 SECONDS_BETWEEN_FRAMES = 10.0
 """Least time between two writings of the merged frames [s]; the part of a case is saved as soon as the case ends."""
-
-
-@dataclass(frozen=True)
-class Results:
-    """The results of a study.
-
-    runs, steps, fields : tidy frames; `nlsolve.results.columns` says what every column means.
-    folder : the results folder; None if the results are in memory only.
-    notes : one sentence for each table or figure that could not be shown, with the reason, and for each thing that was
-        done otherwise than asked.
-    """
-
-    study: Study
-    runs: pd.DataFrame
-    steps: pd.DataFrame
-    fields: pd.DataFrame
-    folder: Path | None = None
-    notes: tuple[str, ...] = ()
-
-    @property
-    def crashed(self) -> int:
-        """How many cases stopped on an error in the program or in a plugin, or were stopped at a limit."""
-        return int(self.runs["status"].isin([status.word for status in FAILED]).sum())
-
-    @property
-    def frames(self) -> Frames:
-        """The three frames."""
-        return Frames(self.runs, self.steps, self.fields)
-
-    @property
-    def findings(self) -> tuple[Finding, ...]:
-        """What the study expects to find, and whether these runs bear it out; nothing until all cases are finished."""
-        if len(self.runs) < len(self.study.cases):
-            return ()
-        return judged(self.study.expectations, self.study.tables, self.runs)
-
-    def tables(self) -> list[Table]:
-        """The declared tables that these runs can fill; the others are in `notes`."""
-        return built(self.study.tables, self.runs)[0]
-
-    def table(self, name: str) -> pd.DataFrame:
-        """The cells of a declared table. Raises StudyError if no table has this name or these runs cannot fill it."""
-        for spec in self.study.tables:
-            if spec.name == name:
-                return build(spec, self.runs).cells
-        names = [spec.name for spec in self.study.tables]
-        raise StudyError(f"{self.study.name}: the study declares no table {name!r}; {did_you_mean(name, names)}")
 
 
 def run(
@@ -146,11 +99,13 @@ def run(
         turns: Turns = ExclusiveTurns(study, store, chosen, counted)
     else:
         turns = Turns(study, store, chosen)
-    frames = _merged(study, _taken(turns, chosen_engine, tell))
+    parts = _taken(turns, chosen_engine, tell)
+    frames = _merged(study, parts)
     told = (*(counter.notes if counter is not None else ()), *chosen_engine.notes)
     notes = (*told, *_unfinished(len(frames.runs), len(study.cases), bool(study.expectations)))
     if store is None:
-        return Results(study, frames.runs, frames.steps, frames.fields, notes=notes)
+        recorded = {case: part.iterates for case, part in parts.items() if len(part.iterates)}
+        return Results(study, frames.runs, frames.steps, frames.fields, None, notes, recorded)
     notes += _show(store, study, frames, notes)
     store.mark_shown(notes)
     return Results(study, frames.runs, frames.steps, frames.fields, store.folder, notes)

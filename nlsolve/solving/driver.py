@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from functools import partial
 from typing import Any
 
@@ -36,12 +36,15 @@ def solve(
     stop: StoppingTest,
     budget: Budget,
     ledger: Ledger,
+    keep: Callable[[Array], None] | None = None,
 ) -> Outcome:
     """Take steps of `solver` on `problem` from `start` (U,) until the stopping test, the budget or a failure ends them.
 
     After every step the driver measures ‖R_new‖/‖R_old‖ for the table of steps and for the refresh rule of `tangent`.
     A SolveError of the method becomes the status of the outcome, as does the limit at which the case is stopped; any
     other error is raised, as is a TypeError for what is no state or no residual (`nlsolve.solving.work.promises`).
+
+    keep : is called with the state of each row of steps, its own copy.
     """
     counted = CountedProblem(problem, ledger, tangent.operator)
     begun, renewals, withheld = ledger.copy(), tangent.renewals, tangent.withheld
@@ -124,6 +127,8 @@ def solve(
         tangent.step_taken(contraction)
         difference = stop.difference(step.state, before) if number else np.nan
         before = step.state.copy()  # a method may overwrite its array later
+        if keep is not None:
+            keep(before)
         measured = {
             "step": number,
             "tangents": tangent.renewals,

@@ -21,7 +21,7 @@ from nlsolve.contracts.rules.refresh import RefreshRule
 from nlsolve.contracts.scene import Entry, Simulation, Solve
 from nlsolve.contracts.status import STOPPED, CaseStopped, SolveError, Status
 from nlsolve.results.columns import REPORTED, run_columns
-from nlsolve.results.frames import steps_frame
+from nlsolve.results.frames import iterates_frame, steps_frame
 from nlsolve.series import Array
 from nlsolve.solving.driver import solve
 from nlsolve.solving.matrices import checked
@@ -73,6 +73,7 @@ class Record:
     outcome : how the case ended; in a case of one solve, the outcome of that solve.
     steps : its rows of `steps`.
     fields : its rows of `fields`, one for each node and recorded time.
+    iterates : the state of each row of `steps`, where they are recorded; see `iterates_frame`.
     problem, state : the problem solved last and its solution (U,), on which the cost of work can be timed; None when
         no problem was solved.
     """
@@ -81,6 +82,7 @@ class Record:
     outcome: Outcome
     steps: pd.DataFrame
     fields: pd.DataFrame = field(default_factory=pd.DataFrame)
+    iterates: pd.DataFrame = field(default_factory=pd.DataFrame)
     problem: NonlinearProblem | None = None
     state: Array | None = None
 
@@ -98,7 +100,8 @@ def run_case(
     parts : has the component of each section as an attribute of that name.
     listen, clock, watch, way, share : see `simulate`.
     """
-    return simulate(lambda entry: simulation_of(parts, entry), parts, listen, clock, watch, way, share)
+    iterates = parts.record.iterates
+    return simulate(lambda entry: simulation_of(parts, entry), parts, listen, clock, watch, way, share, iterates)
 
 
 @np.errstate(all="ignore")  # what is not finite becomes a status, a doubt or a NaN
@@ -110,6 +113,7 @@ def simulate(
     watch: Callable[[Simulation], None] | None = None,
     way: Way | None = None,
     share: Callable[[Way], None] | None = None,
+    iterates: bool = False,
 ) -> Record:
     """Solve the problems of a simulation. A solve that fails becomes the status of the record, not an error.
 
@@ -119,11 +123,14 @@ def simulate(
     watch : called with the simulation whenever it has kept a state.
     way : the way to the first state as another case has solved it, whose outcomes are taken as far as they serve.
     share : called with the way to the first state when it is solved, or has failed; not when it was taken whole.
+    iterates : whether the state of each row of `steps` is recorded.
     """
     for name in LOADED_WHEN_ASKED_FOR:  # before a clock runs: importing them is no work of the method
         getattr(scipy, name)
     nothing: Callable[[Any], None] = lambda told: None  # noqa: E731
-    return _Run(build, method, listen or nothing, clock, watch or nothing, way or Way(()), share or nothing).record()
+    run = _Run(build, method, listen or nothing, clock, watch or nothing, way or Way(()), share or nothing)
+    run.iterates = [] if iterates else None
+    return run.record()
 
 
 class _Refused(Simulation):
@@ -171,6 +178,7 @@ class _Run:
         self.tangent = Tangent(method.linear, method.refresh, self.ledger, operator=self.operator)
         self.simulation = build(self.ledger.entry)
         self.rows: list[dict[str, Any]] = []
+        self.iterates: list[Array] | None = None
         self.increments = self.iterations = self.idle = 0
         self.time = 0.0
         self.validity_time: float | None = None
@@ -184,7 +192,8 @@ class _Run:
         outcome = self.outcome()
         summary = self.summary(outcome)
         problem, state = self.kept or (None, None)
-        return Record(summary, outcome, steps_frame(self.rows), self.simulation.fields(), problem, state)
+        iterates = iterates_frame(self.iterates or [])
+        return Record(summary, outcome, steps_frame(self.rows), self.simulation.fields(), iterates, problem, state)
 
     def outcome(self) -> Outcome:
         """Solve the problems of the simulation one after another; returns the outcome of the case."""
@@ -216,7 +225,10 @@ class _Run:
         self.walk.end()
         if not self.tangent.renewals:  # reuses the ordering of the way to the first state
             self.tangent = Tangent(method.linear, method.refresh, self.ledger, self.walk.ordered(), self.operator)
-        outcome = solve(task.problem, method.solver, self.tangent, task.start, method.stop, method.budget, self.ledger)
+        keep = None if self.iterates is None else self.iterates.append
+        outcome = solve(
+            task.problem, method.solver, self.tangent, task.start, method.stop, method.budget, self.ledger, keep
+        )
         self.iterations += outcome.iterations
         self.idle += outcome.idle
         self.false_convergence += outcome.claimed_wrongly

@@ -15,12 +15,13 @@ from pydantic_core import PydanticSerializationError, to_jsonable_python
 from nlsolve.contracts.component import Component
 from nlsolve.contracts.linear_solver import LinearSolver
 from nlsolve.contracts.nonlinear_solver import NonlinearSolver
+from nlsolve.contracts.recording import IterateRecording
 from nlsolve.contracts.rules.operator import IterationOperator
 from nlsolve.contracts.rules.refresh import RefreshRule
 from nlsolve.contracts.scene import Misfit, Scene, Section
 from nlsolve.registry.component_tables import ComponentTable, class_name
 from nlsolve.registry.problems import ABSENT, Problem, problems_in, unknown
-from nlsolve.registry.registry import CONTRACTS, PluginRow, Registry, parameters_of
+from nlsolve.registry.registry import CONTRACTS, PluginRow, Registry, meaning_of, parameters_of
 from nlsolve.results.parameters import names_settings
 from nlsolve.solving.stopping import Budget, StoppingTest
 from nlsolve.study.known_parts import KnownPart, KnownParts, keys_of
@@ -34,6 +35,7 @@ COMMON: Mapping[str, Section] = {
     "operator": Section(IterationOperator),
     "stop": Section(StoppingTest),
     "budget": Section(Budget),
+    "record": Section(IterateRecording),
     "limits": Section(Limits),
 }
 """The sections of every case, besides `scene` and those that the scene's class declares."""
@@ -106,13 +108,20 @@ class Composer:
         self._holds_instances = bool(given)
         for scene in (*registry.classes(Scene.noun).values(), *given):
             if issubclass(scene, Scene):
-                self.all_sections |= sections_of(scene)
-        self.all_sections |= COMMON
+                self._add_sections(sections_of(scene))
+        self._add_sections(COMMON)
 
     @property
     def sections(self) -> tuple[str, ...]:
         """Names of the sections that cases of any known scene may have; only their parameters can be swept."""
         return (Scene.noun, *self.all_sections)
+
+    def _add_sections(self, sections: Mapping[str, Section]) -> None:
+        """Take up sections; of two with one name that whose component has all keys of the other, or else the last."""
+        for name, section in sections.items():
+            known = self.all_sections.setdefault(name, section)
+            if known.contract is section.contract or not issubclass(known.contract, section.contract):
+                self.all_sections[name] = section
 
     def case(self, document: Document, points: Sequence[Point]) -> Case:
         """The case of a document to which the values of `points`, one of each sweep, are assigned. Raises Invalid."""
@@ -264,6 +273,7 @@ def section_rows(registry: Registry) -> list[PluginRow]:
             "",
             f"nlsolve, for {'every scene' if len(askers[name]) == len(scenes) else ', '.join(askers[name])}",
             parameters_of(section.contract),
+            meaning=meaning_of(section.contract),
         )
         for name, section in found.items()
         if name in askers and section.contract not in CONTRACTS.values()

@@ -11,7 +11,7 @@ from typing import Any
 
 from pydantic import BaseModel
 
-from nlsolve.contracts.component import NAMES_A_FILE
+from nlsolve.contracts.component import NAMES_A_FILE, Component
 from nlsolve.study.sweeps import Document, leaves
 
 Key = tuple[type, str, str]
@@ -23,7 +23,7 @@ class KnownPart:
     """The component of one section.
 
     component : None where the section has none.
-    text : its fields as JSON, keys in order.
+    text : its fields as JSON, keys in order, but for incidental ones.
     parameters : its fields under dotted names, lists as JSON text.
     classes, files : the class and the files of each component at any depth.
     """
@@ -41,7 +41,7 @@ class KnownPart:
         parameters = {
             dotted: json.dumps(value) if isinstance(value, list | dict) else value for dotted, value in leaves(flat)
         }
-        text = json.dumps(plain, sort_keys=True, separators=(",", ":"))
+        text = json.dumps(_telling(component, plain), sort_keys=True, separators=(",", ":"))
         return cls(component, text, parameters, classes_of(component), files_read(component))
 
 
@@ -75,6 +75,14 @@ def keys_of(document: Document, names: Iterable[str]) -> dict[str, str] | None:
 
 
 _written = json.JSONEncoder(sort_keys=True).encode
+
+
+def _telling(component: Any, plain: Any) -> Any:
+    """The fields of a component, as JSON values, that tell cases apart: all but incidental ones, at any depth."""
+    if not (isinstance(component, Component) and isinstance(plain, dict)):
+        return plain
+    kept = {name: value for name, value in plain.items() if name not in component.incidental}
+    return {name: _telling(getattr(component, name, None), value) for name, value in kept.items()}
 
 
 def classes_of(value: Any) -> frozenset[type]:

@@ -10,6 +10,7 @@ from typing import Any
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
+from nlsolve.contracts import notebook
 from nlsolve.registry.plugin_files import with_plugins
 from nlsolve.registry.problems import ABSENT, Problem, Source, StudyError, problems_in, unknown
 from nlsolve.registry.registry import Registry, load_registry
@@ -58,7 +59,7 @@ class Frame(BaseModel):
     )
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Study:
     """A question, the cases that answer it, and the tables and figures to show.
 
@@ -115,6 +116,26 @@ class Study:
         Raises StudyError as `from_toml` does.
         """
         return _built(Source(name), document, overrides or {}, quick, registry or load_registry(), name)
+
+    def __repr__(self) -> str:
+        return "\n".join(f"{name:<8}  {text}" for name, text in self._told().items())
+
+    def _repr_html_(self) -> str:
+        """What a notebook shows: the question, the number of cases and what varies, tables and figures."""
+        return notebook.facts(self._told())
+
+    def _told(self) -> dict[str, str]:
+        swept = dict.fromkeys(name for case in self.cases for name in case.swept)
+        told = {
+            "study": self.name,
+            "question": self.question,
+            "cases": f"{len(self.cases)}" + (f", {len(self.excluded)} left out" if self.excluded else ""),
+            "swept": ", ".join(swept),
+            "tables": ", ".join(table.name for table in self.tables),
+            "figures": ", ".join(figure.name for figure in self.figures),
+            "expects": f"{len(self.expectations)} findings" if self.expectations else "",
+        }
+        return {name: text for name, text in told.items() if text}
 
 
 def _built(

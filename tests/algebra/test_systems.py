@@ -268,7 +268,8 @@ def test_the_row_of_a_system() -> None:
     row = record.summary
     assert set(row) <= set(RUNS)
     assert set(record.steps.columns) <= set(STEPS)
-    assert len(record.fields) == 0
+    np.testing.assert_array_equal(record.fields["value"], record.outcome.state)
+    np.testing.assert_array_equal(record.fields["unknown"], np.arange(len(record.outcome.state)))
     assert (row["unknowns"], row["increments"], row["root_singular"]) == (4, 1, True)
     assert row["iterations"] == row["tangents"] == row["jacobians"] == row["factorizations"] == 17
     assert row["residual_absolute"] <= 1e-9
@@ -392,7 +393,9 @@ def registry() -> Registry:
 def test_a_study_of_ones_own_system(registry: Registry, tmp_path: Path) -> None:
     study = Study.from_dict(STUDY, registry=registry)
     assert [case.label for case in study.cases] == ["scene.radius = 1.0", "scene.radius = 2.0"]
-    assert not any(name.startswith(("law.", "discretizer.", "start.")) for name in study.cases[0].parameters)
+    parameters = study.cases[0].parameters
+    assert not any(name.startswith(("law.", "discretizer.")) for name in parameters)
+    assert [name for name in parameters if name.startswith("start.")] == ["start.stored"]
     assert study.cases[0].parameters["refresh.kind"] == "every-iteration"
     results = nlsolve.run(study, tmp_path / "out")
     assert results.runs["status"].tolist() == ["converged"] * 2
@@ -410,9 +413,10 @@ def test_a_study_of_ones_own_system(registry: Registry, tmp_path: Path) -> None:
             "law: the scene 'half-known' has no such section: leave it out",
         ),
         ({"discretizer": {"kind": "mls"}}, "discretizer: the scene 'half-known' has no such section"),
-        ({"start": {"adaptive": True}}, "start: the scene 'half-known' has no such section"),
-        ({"start": {"tolerance": 1e-3}}, "start: the scene 'half-known' has no such section"),
-        ({"record": {"times": [0.1]}}, "record: the scene 'half-known' has no such section"),
+        ({"motion": {"markers": True}}, "motion: the scene 'half-known' has no such section"),
+        ({"start": {"adaptive": True}}, "start.adaptive = True: no such field; there are 'stored'"),
+        ({"start": {"tolerance": 1e-3}}, "start.tolerance = 0.001: no such field; there are 'stored'"),
+        ({"record": {"times": [0.1]}}, r"record.times = \[0.1\]: no such field; there are 'iterates'"),
         ({"scene": {"kind": "half-known", "radus": 1.0}}, "no such field; did you mean 'radius'"),
         ({"stop": {"kind": "claim"}}, "the solver 'newton' never claims a solution"),
         ({"scene": {"kind": "half-know"}}, "no such scene; did you mean 'half-known'"),

@@ -73,6 +73,7 @@ def test_a_file_with_two_laws_one_of_them_broken(tmp_path: Path) -> None:
             "Honey.viscosity is a property, and should be a method",
         ),
         ("x = 1", "it defines no component class with a kind"),
+        (f'nlsolve_contract = "99.0"\n{LAW}', "cannot be used: it was written for plugin contract 99.0, and nlsolve "),
     ],
 )
 def test_a_file_that_cannot_be_registered_does_not_keep_its_contract(tmp_path: Path, text: str, sentence: str) -> None:

@@ -237,14 +237,36 @@ def test_plugins_and_why_one_failed(monkeypatch):
     monkeypatch.setattr("nlsolve.cli.options.load_registry", lambda: registry)
     result = nlsolve("plugins")
     assert result.exit_code == 0
-    assert "order: int = 20  p" in result.stdout
-    assert "fakes:newton" in result.stdout
-    assert "another:newton" in result.stdout
-    assert "it has no function nlsolve_components" in result.stdout
+    unfolded = " ".join(result.stdout.split())
+    assert "fakes:newton" in unfolded
+    assert "another:newton" in unfolded
+    assert "it has no function nlsolve_components" in unfolded
+    assert "fakes:newton" in nlsolve("plugins", "solver", "newton").stdout
+    (line,) = [line for line in nlsolve("plugins", "solver", "anm").stdout.splitlines() if "order" in line]
+    assert line.split() == ["order", "20", "int", "p"]
     rows = json.loads(nlsolve("plugins", "--json").stdout)
     anm = next(row for row in rows if row["kind"] == "anm")
     assert anm["parameters"][0] == {"name": "order", "type": "int", "default": 20, "description": "p"}
     assert rows[-1]["source"] == "broken 0.1"
+
+
+def test_what_is_installed_is_a_page_and_one_kind_of_it_is_told_in_detail(monkeypatch):
+    monkeypatch.setattr("nlsolve.cli.options.load_registry", load_registry)
+    page = nlsolve("plugins").stdout.splitlines()
+    assert len(page) < 40
+    assert max(map(len, page)) <= 110
+    assert "Version 1.0 of the plugin contract." in page
+    of_newton = nlsolve("plugins", "solver", "newton").stdout
+    assert "K* w = −R(u), u ← u + t w" in of_newton
+    assert "the step length t is found" in of_newton
+    assert nlsolve("plugins", "form", "newton").stdout.startswith("form newton\n")
+    both = json.loads(nlsolve("plugins", "newton", "--json").stdout)
+    assert [row["noun"] for row in both] == ["solver", "form"]
+    result = nlsolve("plugins", "solver", "nwton")
+    assert (result.exit_code, result.stderr) == (
+        2,
+        "solver nwton: no such section or kind; did you mean 'newton'?\n",
+    )
 
 
 def test_plugins_lists_the_fields_of_sections_without_kinds(monkeypatch):
@@ -253,7 +275,8 @@ def test_plugins_lists_the_fields_of_sections_without_kinds(monkeypatch):
     assert set(rows) == {"physics", "time", "motion", "start", "record", "stop", "budget", "limits"}
     assert rows["time"]["source"] == "nlsolve, for every scene"
     assert [field["name"] for field in rows["time"]["parameters"]] == ["horizon", "increment"]
-    assert "divergence_tolerance" in nlsolve("plugins").stdout
+    assert "divergence_tolerance" in nlsolve("plugins", "physics").stdout
+    assert "divergence_tolerance" not in nlsolve("plugins").stdout
 
 
 def test_many_rows_are_lines_without_rules(tmp_path):
@@ -330,7 +353,7 @@ def test_a_plugin_of_one_file(tmp_path):
     (tmp_path / "half.py").write_text(HALF, encoding="utf-8")
     for command in ("validate", "run"):
         assert nlsolve(command, path, "--plugin", "half.py").exit_code == 0
-    assert "half (half.py)" in nlsolve("plugins", "--plugin", "half.py").stdout
+    assert "from half (half.py): half\n" in nlsolve("plugins", "--plugin", "half.py").stdout
     result = nlsolve("plan", path, "--plugin", "nowhere.py")
     assert (result.exit_code, result.stderr) == (
         2,

@@ -17,7 +17,8 @@ from nlsolve.plugin import InputFile
 from nlsolve.registry.problems import StudyError
 from nlsolve.results.columns import FIELDS, RUNS, STEPS
 from nlsolve.running.planning.plan import plan_of
-from nlsolve.running.runner import Event, Results, run
+from nlsolve.running.results import Results
+from nlsolve.running.runner import Event, run
 from nlsolve.running.store.identity import identity_of
 from nlsolve.running.store.store import Store
 from nlsolve.study.study import Study

@@ -12,8 +12,13 @@ from nlsolve.cli.plugins.scaffold import CONTRACTS, files_of, write
 from nlsolve.registry.problems import StudyError, did_you_mean
 
 
+def contracts(incomplete: str) -> list[str]:
+    """What a shell may complete."""
+    return [contract for contract in CONTRACTS if contract.startswith(incomplete)]
+
+
 def new(
-    contract: Annotated[str, typer.Argument(metavar="CONTRACT", help=", ".join(CONTRACTS))],
+    contract: Annotated[str, typer.Argument(metavar="CONTRACT", help=", ".join(CONTRACTS), autocompletion=contracts)],
     name: Annotated[
         str, typer.Argument(metavar="NAME", help="the kind by which studies ask for it, such as my-solver")
     ],

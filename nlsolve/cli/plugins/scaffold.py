@@ -10,11 +10,15 @@ from importlib.metadata import version
 from importlib.util import find_spec
 from pathlib import Path
 
+from nlsolve.registry.contract_version import CONTRACT_VERSION, STATED
 from nlsolve.registry.problems import StudyError
 
 TEMPLATES = Path(__file__).parent / "templates"
 
 HOOK = """
+
+{stated} = "{contract}"  # the version of the plugin contract that this is written for
+
 
 @hookimpl
 def nlsolve_components():
@@ -66,7 +70,7 @@ def files_of(contract: str, name: str, package: bool) -> dict[str, str]:
         "study": study,
         "version": version("nlsolve"),
         "hook_import": ", hookimpl" if package else "",
-        "hook": HOOK.format(cls=cls) if package else "",
+        "hook": HOOK.format(cls=cls, stated=STATED, contract=CONTRACT_VERSION) if package else "",
         "plugins": "" if package else f'plugins = ["./{module}.py"] # relative to this file\n',
         "imports": ", ".join(sorted((made.check, *made.imports))),
         "call": f"{made.check}({cls}(){made.arguments})",

@@ -15,6 +15,7 @@ from pydantic import Field, model_validator
 
 from nlsolve.contracts.component import Component
 from nlsolve.contracts.continuum.law import ConstitutiveLaw
+from nlsolve.contracts.recording import IterateRecording
 from nlsolve.series import Array
 
 
@@ -131,10 +132,8 @@ class NodeMotion(Component):
         return self.nodes == "lagrangian"
 
 
-class Recording(Component):
-    """What is recorded of a flow beside its last state."""
-
-    noun: ClassVar[str] = "record"
+class Recording(IterateRecording):
+    """What is recorded of a case beside its last state; `times` and `probe` are of flows only."""
 
     times: tuple[Annotated[float, Field(ge=0)], ...] = Field(
         (), description="times at which the fields are recorded, besides the last [s]"

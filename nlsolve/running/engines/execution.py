@@ -61,7 +61,8 @@ def execute(
         timed |= {"load": taken, "core": min(here) if len(here) == 1 else None}
     row = {"case": case, **record.summary, **timed, **units, **parameters}
     rounds = (measured_in(row),) if lane == EXCLUSIVE else ()
-    return _with_environment(Part(row, _of_case(case, record.steps), _of_case(case, record.fields), rounds=rounds))
+    frames = _of_case(case, record.steps), _of_case(case, record.fields)
+    return _with_environment(Part(row, *frames, iterates=record.iterates, rounds=rounds))
 
 
 def unit_costs(record: Record, linear: LinearSolver, clock: Callable[[], float]) -> dict[str, float]:

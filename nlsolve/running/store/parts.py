@@ -3,6 +3,7 @@
     cases/KEY.json               its identity, its row of `runs`, and how long its frames are; written last
     cases/KEY.steps.parquet      its rows of `steps`, if it has any
     cases/KEY.fields.parquet     its rows of `fields`, if it has any
+    cases/KEY.iterates.parquet   the state of each of its rows of `steps`, if the study asks for them
     cases/KEY.txt                what it has printed, if anything
     environments/NAME.json       where rows were computed, once for all rows that share it
 
@@ -119,6 +120,15 @@ class Parts:
             return None
         return steps, fields
 
+    def iterates(self, entry: Entry) -> pd.DataFrame:
+        """The iterates of a part; no rows where they were not recorded, or are damaged."""
+        if "iterates" not in entry.frames:
+            return pd.DataFrame()
+        try:
+            return pd.read_parquet(self._frame(entry.identity.key, "iterates"))
+        except (OSError, ValueError, ArrowException):
+            return pd.DataFrame()
+
     def save(
         self,
         identity: Identity,
@@ -130,7 +140,7 @@ class Parts:
         """Write a part. Its JSON is written last. elapsed, way : see `Entry`."""
         measured = {name: value for name, value in part.run.items() if name not in {"case", *parameters}}
         sizes = {}
-        for name, frame in (("steps", part.steps), ("fields", part.fields)):
+        for name, frame in (("steps", part.steps), ("fields", part.fields), ("iterates", part.iterates)):
             if len(frame):
                 path = self._frame(identity.key, name)
                 write_frame(self.folder, path, frame)

@@ -130,6 +130,15 @@ def output_file(folder: Path, case: str) -> Path | None:
     return next((path for key in keys if (path := output_path(folder, key)).exists()), None)
 
 
+def iterates_in(folder: Path, case: str) -> pd.DataFrame:
+    """The iterates of a case of the folder's study; no rows where they were not recorded."""
+    described = description_of(folder)
+    keys = [planned.key for planned in described.cases if case_of(planned.key) == case] if described else []
+    parts = Parts(folder)
+    found = (parts.iterates(entry) for key in keys if (entry := parts.entry(key)) is not None)
+    return next(found, pd.DataFrame())
+
+
 def is_results_folder(folder: Path) -> bool:
     """Whether a folder has parts, or a place for them."""
     return (folder / CASES).is_dir()

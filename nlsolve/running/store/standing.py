@@ -19,12 +19,18 @@ from nlsolve.study.timing import Timing
 KEPT, NEW, DAMAGED, TIMED = "kept", "new", "damaged", "timed again"
 """Words for a case: its part is kept, there is none, it cannot be read, or its seconds were taken in another way."""
 
+WITHOUT_ITERATES = "without iterates"
+"""The word for a case whose part has no iterates, which the study asks for now."""
+
+ITERATES = "record.iterates"
+
 
 @dataclass(frozen=True)
 class Standing:
     """What a folder has of one case.
 
-    word : KEPT, NEW, DAMAGED, TIMED, "retried (crashed)", or what has changed: "changed plugin honey 1.0 -> 1.1".
+    word : KEPT, NEW, DAMAGED, TIMED, WITHOUT_ITERATES, "retried (crashed)", or what has changed: "changed plugin honey
+        1.0 -> 1.1".
     entry : the part that stands, if its case is kept or timed again.
     last : how the case ended last, even if its source or a file has changed since; None when nothing is known of it.
     """
@@ -60,6 +66,8 @@ class Standings:
         run = {**entry.measured, **entry.parameters}
         if is_tried_again(run, case.parts.limits, self.retry) and entry.written < self.begun:
             return Standing(identity, f"retried ({status_of(entry.measured).word})", last=entry)
+        if case.parts.record.iterates and not entry.parameters.get(ITERATES):
+            return Standing(identity, WITHOUT_ITERATES, last=entry)
         return Standing(identity, KEPT if has_rounds(entry.measured, self.timing) else TIMED, entry, entry)
 
     def of_all(self, cases: Sequence[Case]) -> dict[str, Standing]:

@@ -22,7 +22,8 @@ from nlsolve.registry.problems import StudyError
 from nlsolve.results.frames import Part
 from nlsolve.running.engines import choice, local
 from nlsolve.running.engines.engine import Event, Turn
-from nlsolve.running.runner import Results, run
+from nlsolve.running.results import Results
+from nlsolve.running.runner import run
 from nlsolve.running.store.claims import claimed
 from nlsolve.running.store.parts import Parts
 from nlsolve.running.store.reading import output_file, status_of_folder

@@ -10,10 +10,10 @@ import pandas as pd
 import scipy
 from pydantic import Field
 
+from nlsolve.results.states.triangles import boundaries
 from nlsolve.series import Array
 from nlsolve.show import plotting
 from nlsolve.show.figures.nodes.panels import PanelsFigure, Snapshot, layer_names, panels_of
-from nlsolve.show.figures.nodes.sections import boundaries
 from nlsolve.show.figures.style import ACCENT, COLOURS, legend_outside
 
 HALVES = (("$y_0 > 0$", COLOURS[0]), (r"$y_0 \leq 0$", COLOURS[4]))

@@ -11,7 +11,7 @@ from pydantic import Field
 from nlsolve.series import Array
 from nlsolve.show import plotting
 from nlsolve.show.figures.nodes.panels import PanelsFigure, Snapshot, layer_names, panels_of
-from nlsolve.show.figures.nodes.sections import outline, triangulate
+from nlsolve.show.figures.nodes.sections import POSITIVE, NodalValue, outline, triangulate
 from nlsolve.show.figures.style import DASHES, POSITIVE_MAP, SIGNED_MAP, axis_label, legend_outside
 
 LEVELS = 20
@@ -20,11 +20,11 @@ FLOOR = 1e-12  # of the largest value: what a logarithmic field shows at least
 
 
 class FieldFigure(PanelsFigure):
-    """Filled contours of a nodal value: diverging colours about 0 for what has a sign, sequential ones for ε̄."""
+    """Filled contours of a nodal value: diverging colours about 0 for what has a sign, sequential ones for ε̄ and μ."""
 
     kind: Literal["field"] = "field"
-    value: Literal["u", "v", "exx", "eyy", "exy", "rate"] = Field(description="column of `fields`")
-    log: bool = Field(False, description="logarithmic colours; for `rate`")
+    value: NodalValue = Field(description="column of `fields`")
+    log: bool = Field(False, description="logarithmic colours; for `rate` and `viscosity`")
     limit: float | None = Field(
         None, gt=0, description="largest magnitude the colours distinguish; absent: the largest"
     )
@@ -34,8 +34,9 @@ class FieldFigure(PanelsFigure):
         return ("x", "y", self.value)
 
     def show(self, figure: plotting.Figure, shown: Sequence[Snapshot], among: Sequence[Snapshot]) -> None:
-        if self.log and self.value != "rate":
-            raise self.refuse(f"value = {self.value!r} has a sign, so log = true cannot show it; only 'rate' can")
+        if self.log and self.value not in POSITIVE:
+            signless = " and ".join(POSITIVE)
+            raise self.refuse(f"value = {self.value!r} has a sign, so log = true cannot show it; {signless} have none")
         levels, extend = self._levels(np.concatenate([s.rows[self.value].to_numpy(float) for s in among]))
         apart, over = self.layers(shown)
         panels = panels_of(figure, self, apart, among, bar=True)
@@ -47,7 +48,7 @@ class FieldFigure(PanelsFigure):
         contours = None
         for axes, snapshot in panels:
             triangles, values = self._shown(snapshot, levels[0])
-            colours = POSITIVE_MAP if self.value == "rate" else SIGNED_MAP
+            colours = POSITIVE_MAP if self.value in POSITIVE else SIGNED_MAP
             contours = axes.tricontourf(triangles, values, levels=levels, cmap=colours, extend=extend)
             contours.set_edgecolor("face")  # hides the seams that PDF viewers draw between bands
             contours.set_linewidth(0.2)
@@ -96,7 +97,7 @@ class FieldFigure(PanelsFigure):
             low = np.floor(np.log10(max(float(positive.min()), FLOOR * largest)))
             high = max(np.ceil(np.log10(top)), low + 1)
             return np.linspace(low, high, int(high - low) * max(1, round(LEVELS / (high - low))) + 1), "neither"
-        bottom = 0.0 if self.value == "rate" else -top
-        ends: Literal["neither", "both", "max"] = "neither" if not cut else "max" if self.value == "rate" else "both"
+        bottom = 0.0 if self.value in POSITIVE else -top
+        ends: Literal["neither", "both", "max"] = "neither" if not cut else "max" if self.value in POSITIVE else "both"
         # an odd number of bands, so that one of them is centred on 0 and a field at rest is white
         return np.linspace(bottom, top, LEVELS + 2), ends

@@ -14,7 +14,7 @@ from nlsolve.series import Array
 from nlsolve.show import plotting
 from nlsolve.show.figures.cases import plain
 from nlsolve.show.figures.nodes.panels import NodesFigure, snapshots_of
-from nlsolve.show.figures.nodes.sections import slice_triangles, triangulate
+from nlsolve.show.figures.nodes.sections import NodalValue, slice_triangles, triangulate
 from nlsolve.show.figures.style import axis_label, curve_style, finish, join
 
 EXACT: Any = {
@@ -36,7 +36,7 @@ class ProfileFigure(NodesFigure):
     kind: Literal["profile"] = "profile"
     axis: Literal["x", "y"] = Field(description="the coordinate that varies along the line")
     at: float = Field(0.0, description="the other coordinate, constant along the line [mm]")
-    value: Literal["u", "v", "exx", "eyy", "exy", "rate"] = Field(description="column of `fields`")
+    value: NodalValue = Field(description="column of `fields`")
     log: bool = Field(False, description="logarithmic vertical axis")
 
     def paint(self, figure: plotting.Figure, frames: Frames) -> pd.DataFrame:

@@ -5,19 +5,20 @@ N nodes, E edges; `rows` are nodes of `fields` at one time, see `nlsolve.results
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Literal
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
+from nlsolve.results.states.triangles import boundaries, outside_material
 from nlsolve.series import Array
 from nlsolve.show import plotting
 
+NodalValue = Literal["u", "v", "exx", "eyy", "exy", "rate", "viscosity", "sxx", "syy", "sxy", "pressure"]
+"""The columns of `fields` that figures show."""
 
-def boundaries(rows: pd.DataFrame) -> NDArray[Any]:
-    """Boundary group of every node, (N,) words; empty inside, also where a CSV file came back with NaN."""
-    return rows["boundary"].astype(object).fillna("").astype(str).to_numpy()
+POSITIVE = ("rate", "viscosity")
+"""Those of them that have no sign."""
 
 
 def triangulate(rows: pd.DataFrame, value: Array | None = None) -> plotting.Triangulation:
@@ -26,13 +27,9 @@ def triangulate(rows: pd.DataFrame, value: Array | None = None) -> plotting.Tria
     x, y = rows["x"].to_numpy(float), rows["y"].to_numpy(float)
     triangulation = plotting.Triangulation(x, y)
     corners = triangulation.triangles
-    group = boundaries(rows)[corners]
-    hole = (group[:, 0] != "") & (group == group[:, :1]).all(axis=1)
-    (ax, bx, cx), (ay, by, cy) = x[corners].T, y[corners].T
-    area = np.abs((bx - ax) * (cy - ay) - (by - ay) * (cx - ax))
-    flat = area <= 1e-12 * np.ptp(x) * np.ptp(y)
+    outside = outside_material(np.stack([x, y], axis=1), boundaries(rows), corners)
     unknown = ~np.isfinite(value[corners]).all(axis=1) if value is not None else np.zeros(len(corners), dtype=bool)
-    triangulation.set_mask(hole | flat | unknown)
+    triangulation.set_mask(outside | unknown)
     return triangulation
 
 
