@@ -106,9 +106,15 @@ class Discretizer(Component, ABC):
     def moved(self, operators: Operators, cloud: Cloud) -> Operators | None:
         """The operators of a cloud whose nodes have moved a little, made with the `neighbours` found before; None when
         these no longer fit. Called only with `operators` that have neighbours. A class that overrides `operators` must
-        override `moved` too.
+        override `moved` and `renewed` too.
         """
         return None
+
+    def renewed(self, operators: Operators, cloud: Cloud) -> Operators:
+        """The operators of a cloud whose nodes have moved, those that `operators` gives: what the `neighbours` found
+        before know may save time, and changes nothing. Called only with `operators` that have neighbours.
+        """
+        return self.operators(cloud, operators.volumetric is not None)
 
     @abstractmethod
     def gradient(self, cloud: Cloud) -> tuple[Any, Any]:
