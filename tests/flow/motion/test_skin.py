@@ -224,10 +224,6 @@ class Counted(MovingLeastSquares):
         SEARCHES.append(len(cloud.nodes))
         return super().operators(cloud, volumetric)
 
-    def renewed(self, operators: Operators, cloud: Cloud) -> Operators:
-        SEARCHES.append(len(cloud.nodes))
-        return super().renewed(operators, cloud)
-
 
 SEARCHES: list[int] = []
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from clouds import CLOUDS, jittered_points
@@ -70,13 +72,18 @@ def test_renewed_after_kept_neighbours_are_those_of_the_cloud() -> None:
     assert difference(discretizer.operators(last, True), discretizer.renewed(kept, last)) == 0.0
 
 
-def test_a_discretizer_that_knows_nothing_of_motion_builds_its_operators_anew() -> None:
+def test_a_class_that_overrides_operators_alone_builds_them_anew() -> None:
     class Plain(LinearTriangles):
-        renewed = Discretizer.renewed
+        def operators(self, cloud: Cloud, volumetric: bool) -> Operators:
+            return replace(super().operators(cloud, volumetric), node_areas=np.ones(len(cloud.interior)))
 
-    cloud = stirred(CLOUDS["jittered"], 0.1, 0)
-    operators = Plain().renewed(Plain().operators(CLOUDS["jittered"], True), cloud)
-    assert difference(Plain().operators(cloud, True), operators) == 0.0
+    class Further(Plain):
+        pass
+
+    for discretizer in (Plain(), Further()):
+        operators = discretizer.operators(CLOUDS["jittered"], True)
+        renewed = discretizer.renewed(operators, stirred(CLOUDS["jittered"], 0.1, 0))
+        assert (renewed.node_areas == 1.0).all()
 
 
 def test_renewed_operators_are_refused_where_those_of_the_cloud_are() -> None:
