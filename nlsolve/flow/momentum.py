@@ -8,6 +8,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property, reduce
+from operator import add
 from typing import Any
 
 import numpy as np
@@ -189,12 +191,15 @@ class Flow(NonlinearProblem):
             ),
             shape=(3 * points, 3 * points),
         )
-        jacobian = -(self._force @ (pointwise @ self._strain))
-        if self._gradient is not None:
-            jacobian = jacobian + self._gradient @ self._dilatation
-        if self._inertia is not None:
-            jacobian = jacobian + sp.diags_array(self._inertia)
-        return jacobian if carried is None else jacobian + carried
+        parts = [-(self._force @ (pointwise @ self._strain)), self._without_stress, carried]
+        return reduce(add, (part for part in parts if part is not None))
+
+    @cached_property
+    def _without_stress(self) -> Any:
+        """W ρ/Δt − S_θ λ B_θ, the same for every u; None where neither is present."""
+        volumetric = None if self._gradient is None else self._gradient @ self._dilatation
+        inertia = None if self._inertia is None else sp.diags_array(self._inertia)
+        return inertia if volumetric is None else volumetric if inertia is None else volumetric + inertia
 
     def scale(self, u: Array) -> float:
         """‖|S| |s| + |S_θ λ| |B_θ v| + W ρ |v/Δt + v·∇ v| + |constant|‖₂: the size of the forces that cancel in R."""

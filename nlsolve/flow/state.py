@@ -7,7 +7,6 @@ from copy import copy
 from typing import Any, Protocol
 
 import numpy as np
-import scipy
 
 from nlsolve.contracts.continuum.cloud import Cloud
 from nlsolve.contracts.continuum.discretizer import Discretizer, Operators, PointOperators
@@ -163,8 +162,7 @@ class FlowState:
         body_force = self.scene.body_force(self.cloud.nodes[self.cloud.interior], law, physics)
         modulus: float | Array = 0.0
         if self.volumetric:
-            rate_squared = self.rate_squared_at_volume_points(operators)
-            modulus = physics.penalty_modulus(law, self.scene.reference_rate, rate_squared)
+            modulus = physics.penalty_modulus(law, self.scene.reference_rate, self.rate_squared_at_volume_points)
         return Flow(
             self.cloud,
             operators,
@@ -198,11 +196,9 @@ class FlowState:
             there.drift = self.drift.at(*self._passage(self.cloud, self.operators, there.operators))
         return there
 
-    def rate_squared_at_volume_points(self, operators: Operators) -> Array:
+    def rate_squared_at_volume_points(self) -> Array:
         """ε̄² of the velocity so far, taken at the strain point nearest to each volume point, shape (L,)."""
-        assert operators.volumetric is not None
-        nearest = scipy.spatial.cKDTree(operators.strain.points).query(operators.volumetric.points)[1]
-        return rate_squared(operators.strain_rate(self.velocity)[:, nearest])
+        return rate_squared(self.operators.strain_rate(self.velocity)[:, self.operators.strain_points_beside])
 
     def between_volume_points(self, here: Operators, there: Operators) -> Any:
         """Sparse matrix that takes pressures from the volume points of `here` to those of `there`."""

@@ -15,8 +15,9 @@ from nlsolve_discretizers.conservation import conserving
 from nlsolve_discretizers.weights.assembly import Gradient, sparse_rows
 from nlsolve_discretizers.weights.diagnostics import diagnosis
 from nlsolve_discretizers.weights.least_squares import Derivatives, monomials
+from nlsolve_discretizers.weights.lists import Lists
 from nlsolve_discretizers.weights.neighbours import Neighbours
-from nlsolve_discretizers.weights.supports import Supports
+from nlsolve_discretizers.weights.supports import Supports, offsets
 from nlsolve_discretizers.weights.triangles import Triangles
 
 AT_ONCE = 1024  # targets whose local systems are in the cache together
@@ -48,16 +49,24 @@ class Collocation(Discretizer):
     """How often a weak support is enlarged, by half each time, before it is refused."""
 
     @abstractmethod
-    def supports(self, sources: np.ndarray, targets: np.ndarray, role: str, cloud: Cloud | None) -> Supports:
+    def neighbour_count(self, role: str) -> int | None:
+        """Number of neighbours of a support in a role, before any grows; None where a radius tells."""
+
+    @abstractmethod
+    def supports(
+        self, sources: np.ndarray, targets: np.ndarray, role: str, cloud: Cloud | None, lists: Lists | None = None
+    ) -> Supports:
         """Neighbours of the targets (T, 2) among the sources (S, 2) [mm], for the weights in a role: "strain", "force"
         or "volume" on a cloud, "value" at any points.
+
+        lists : of one source more than `neighbour_count`, where there are such.
         """
 
     @abstractmethod
     def local_weights(
         self, offsets: np.ndarray, radius: np.ndarray, derivatives: Derivatives
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Weights (D, T, k) of D derivatives for neighbours at `offsets` (T, k, 2), and the quality (T,) of the
+        """Weights (D, T, k) of D derivatives for neighbours at `offsets` (2, k, T), and the quality (T,) of the
         supports: 0 for one that determines nothing.
         """
 
@@ -72,22 +81,21 @@ class Collocation(Discretizer):
         role: str,
         derivatives: Derivatives,
         cloud: Cloud | None = None,
-        kept: Supports | None = None,
+        near: Neighbours | None = None,
     ) -> tuple[Supports, np.ndarray]:
-        """Supports and weights (D, T, k) for `derivatives`; supports are found unless `kept`, weak ones are enlarged.
+        """Supports and weights (D, T, k) for `derivatives`; weak supports are enlarged.
 
+        near : what is known of the cloud's neighbours; the supports are put there.
         Raises SolveError naming the place of a support that stays weak.
         """
-        supports = self.supports(sources, targets, role, cloud) if kept is None else kept.moved(sources, targets)
+        supports = self._supports(sources, targets, role, cloud, near)
         quality = np.empty(len(targets))
         found = np.zeros((len(derivatives), *supports.index.shape))
         renew = np.arange(len(targets))
         for attempt in range(self.growths + 1):
             for count, which in _batches(supports.count, renew):
-                offsets = sources[supports.index[which, :count]] - targets[which][:, None]
-                found[:, which, :count], quality[which] = self.local_weights(
-                    offsets, supports.radius[which], derivatives
-                )
+                apart = offsets(sources, targets[which], supports.index[which, :count])
+                found[:, which, :count], quality[which] = self.local_weights(apart, supports.radius[which], derivatives)
             renew = np.flatnonzero(~(quality >= self.weak))
             larger = np.minimum(supports.count[renew] + (supports.count[renew] + 1) // 2, len(sources) - 1)
             if attempt == self.growths or not (larger > supports.count[renew]).any():
@@ -99,7 +107,20 @@ class Collocation(Discretizer):
         error = self.refusal(int(supports.count[worst]), targets[worst], float(quality[worst]))
         if error is not None:
             raise error
+        if near is not None:
+            near.supports[role] = supports
         return supports, found
+
+    def _supports(
+        self, sources: np.ndarray, targets: np.ndarray, role: str, cloud: Cloud | None, near: Neighbours | None
+    ) -> Supports:
+        if near is None:
+            return self.supports(sources, targets, role, cloud)
+        if role in near.supports:
+            return near.supports[role].moved(sources, targets)
+        count = self.neighbour_count(role)
+        lists = None if count is None else near.listed(role, sources, targets, count + 1)
+        return self.supports(sources, targets, role, cloud, lists)
 
     def operators(self, cloud: Cloud, volumetric: bool) -> Operators:
         """B, S and, when asked for, B_θ, S_θ."""
@@ -112,6 +133,15 @@ class Collocation(Discretizer):
         near = operators.neighbours.moved_to(cloud)
         return self._operators(near, operators.volumetric is not None) if near.triangles.are_upright else None
 
+    def renewed(self, operators: Operators, cloud: Cloud) -> Operators:
+        """The operators on the moved cloud, all neighbours found anew with the help of those of before."""
+        near = operators.neighbours.renewed(cloud, self._ends if self.points == "between" else None)
+        return self._operators(near, operators.volumetric is not None)
+
+    def _ends(self, triangles: Triangles) -> np.ndarray:
+        """The edges whose midpoints are the stress points between neighbours, (M, 2)."""
+        return triangles.edges[0] if self.form == "conservative" else triangles.inner_edges
+
     def _operators(self, near: Neighbours, volumetric: bool) -> Operators:
         build = self._conservative if self.form == "conservative" else self._strong
         return replace(build(near, volumetric), neighbours=near)
@@ -120,14 +150,14 @@ class Collocation(Discretizer):
         triangles, cloud = near.triangles, near.triangles.cloud
         nodes, interior = cloud.nodes, cloud.interior
         points = triangles.midpoints() if self.points == "between" else nodes
-        rate = self._gradient(nodes, points, "strain", cloud, near.supports).strain(len(nodes))
-        force = self._gradient(points, nodes[interior], "force", cloud, near.supports).divergence_of_stress(len(points))
+        rate = self._gradient(nodes, points, "strain", cloud, near).strain(len(nodes))
+        force = self._gradient(points, nodes[interior], "force", cloud, near).divergence_of_stress(len(points))
         strain = PointOperators(rate, force, points)
         if not volumetric:
             return Operators(strain)
         if self.volume_points == "pairs":
             return Operators(strain, triangles.patches().strong())
-        gradient = self._gradient(nodes, nodes, "volume", cloud, near.supports)
+        gradient = self._gradient(nodes, nodes, "volume", cloud, near)
         pressure_force = gradient.at(interior).of_pressure(len(nodes))
         return Operators(strain, PointOperators(gradient.divergence(len(nodes)), pressure_force, nodes))
 
@@ -135,16 +165,14 @@ class Collocation(Discretizer):
         triangles, cloud = near.triangles, near.triangles.cloud
         nodes = cloud.nodes
         points, areas = triangles.diamonds() if self.points == "between" else (nodes, triangles.node_areas)
-        gradient = conserving(cloud, points, areas, self._gradient(nodes, points, "strain", cloud, near.supports))
+        gradient = conserving(cloud, points, areas, self._gradient(nodes, points, "strain", cloud, near))
         strain = PointOperators.conservative(cloud, gradient.strain(len(nodes)), points, areas)
         node_areas = triangles.node_areas[cloud.interior]
         if not volumetric:
             return Operators(strain, None, node_areas)
         if self.volume_points == "pairs":
             return Operators(strain, triangles.patches().conservative(), node_areas)
-        gradient = conserving(
-            cloud, nodes, triangles.node_areas, self._gradient(nodes, nodes, "volume", cloud, near.supports)
-        )
+        gradient = conserving(cloud, nodes, triangles.node_areas, self._gradient(nodes, nodes, "volume", cloud, near))
         dilatation = gradient.divergence(len(nodes))
         return Operators(
             strain, PointOperators.conservative(cloud, dilatation, nodes, triangles.node_areas), node_areas
@@ -157,7 +185,7 @@ class Collocation(Discretizer):
     def values(self, sources: np.ndarray, targets: np.ndarray) -> Any:
         """Sparse (T, N) matrix of values."""
         supports, (value,) = self.weights(sources, targets, "value", VALUE)
-        return sparse_rows([[(supports.index, value)]], (len(targets), len(sources)))
+        return sparse_rows([(supports.index, value)], (len(targets), len(sources)))
 
     def diagnostics(self, cloud: Cloud) -> list[dict[str, Any]]:
         """One row each for the strain, force and volume weights of a cloud."""
@@ -176,17 +204,11 @@ class Collocation(Discretizer):
         return rows
 
     def _gradient(
-        self,
-        sources: np.ndarray,
-        targets: np.ndarray,
-        role: str,
-        cloud: Cloud,
-        found: dict[str, Supports] | None = None,
+        self, sources: np.ndarray, targets: np.ndarray, role: str, cloud: Cloud, near: Neighbours | None = None
     ) -> Gradient:
-        """∂/∂x and ∂/∂y at the targets. `found` holds the supports by role; the ones used here are put there."""
-        found = {} if found is None else found
-        found[role], (dx, dy) = self.weights(sources, targets, role, GRADIENT, cloud, found.get(role))
-        return Gradient(found[role].index, dx, dy)
+        """∂/∂x and ∂/∂y at the targets."""
+        supports, (dx, dy) = self.weights(sources, targets, role, GRADIENT, cloud, near)
+        return Gradient(supports.index, dx, dy)
 
 
 def _batches(counts: np.ndarray, targets: np.ndarray) -> Iterator[tuple[int, np.ndarray]]:

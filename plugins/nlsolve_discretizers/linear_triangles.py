@@ -35,6 +35,10 @@ class LinearTriangles(Discretizer):
         triangles = operators.neighbours.moved_to(cloud)
         return _operators(triangles, operators.volumetric is not None) if triangles.are_upright else None
 
+    def renewed(self, operators: Operators, cloud: Cloud) -> Operators:
+        """The operators on the moved cloud, its triangles found with the help of those of before."""
+        return _operators(operators.neighbours.renewed(cloud), operators.volumetric is not None)
+
     def gradient(self, cloud: Cloud) -> tuple[Any, Any]:
         """∂/∂x and ∂/∂y at the nodes: means over the triangles around each, by area."""
         triangles = Triangles.of(cloud)

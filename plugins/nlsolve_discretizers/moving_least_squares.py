@@ -10,6 +10,7 @@ from pydantic import Field, model_validator
 from nlsolve.plugin import Cloud, SolveError, Status
 from nlsolve_discretizers.collocation import Collocation, least_count
 from nlsolve_discretizers.weights.least_squares import Derivatives, fit
+from nlsolve_discretizers.weights.lists import Lists
 from nlsolve_discretizers.weights.supports import Supports
 
 SMALLEST_PIVOT = 1e-8  # of R, relative to its column: below, the support does not determine the polynomial
@@ -36,12 +37,21 @@ class MovingLeastSquares(Collocation):
                 )
         return self
 
-    def supports(self, sources: np.ndarray, targets: np.ndarray, role: str, cloud: Cloud | None) -> Supports:
-        """The nearest sources by count, or those within `radius`; values have as many neighbours as strains."""
+    def neighbour_count(self, role: str) -> int | None:
+        """The counts of the roles, unless a radius is given; values have as many neighbours as strains."""
         if self.radius is not None:
+            return None
+        return {"force": self.force_support, "volume": self.volume_support}.get(role, self.support)
+
+    def supports(
+        self, sources: np.ndarray, targets: np.ndarray, role: str, cloud: Cloud | None, lists: Lists | None = None
+    ) -> Supports:
+        """The nearest sources by count, or those within `radius`."""
+        count = self.neighbour_count(role)
+        if count is None:
+            assert self.radius is not None
             return Supports.within(sources, targets, self.radius)
-        count = {"force": self.force_support, "volume": self.volume_support}.get(role, self.support)
-        return Supports.nearest(sources, targets, count, self.balanced)
+        return Supports.nearest(sources, targets, count, self.balanced, lists)
 
     def local_weights(
         self, offsets: np.ndarray, radius: np.ndarray, derivatives: Derivatives

@@ -10,6 +10,7 @@ from pydantic import Field, model_validator
 from nlsolve.plugin import Cloud, ConstitutiveLaw, SolveError, Status, local_index
 from nlsolve_discretizers.collocation import Collocation, least_count
 from nlsolve_discretizers.weights.least_squares import Derivatives
+from nlsolve_discretizers.weights.lists import Lists
 from nlsolve_discretizers.weights.radial import interpolate, kernel
 from nlsolve_discretizers.weights.supports import Supports
 
@@ -58,12 +59,18 @@ class RadialBasis(Collocation):
             return self
         return self.with_(form="conservative" if local_index(law, rate) < LEAST_STRONG else "strong")
 
-    def supports(self, sources: np.ndarray, targets: np.ndarray, role: str, cloud: Cloud | None) -> Supports:
-        """As many neighbours for every role, and half as many more for a target whose nearest boundary node lies within
+    def neighbour_count(self, role: str) -> int:
+        """As many for every role."""
+        return self.support or 2 * least_count(self.degree)
+
+    def supports(
+        self, sources: np.ndarray, targets: np.ndarray, role: str, cloud: Cloud | None, lists: Lists | None = None
+    ) -> Supports:
+        """The nearest sources by count, and half as many more for a target whose nearest boundary node lies within
         half the radius of its support.
         """
-        count = self.support or 2 * least_count(self.degree)
-        supports = Supports.nearest(sources, targets, count, self.balanced)
+        count = self.neighbour_count(role)
+        supports = Supports.nearest(sources, targets, count, self.balanced, lists)
         if cloud is None:
             return supports
         wall = Supports.nearest(cloud.nodes[cloud.boundary], targets, 1)

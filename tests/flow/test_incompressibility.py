@@ -179,14 +179,14 @@ def test_units_of_the_penalty() -> None:
     """λ = c μ(reference rate), c μ(ε̄²) point by point, or c."""
     law, rate, rates = PowerLaw(index=0.5, regularization=0.0), StirringTool().reference_rate, np.array([1.0, 1e4, 1e6])
     reference, local, absolute = (
-        Physics.model_validate({"penalty": 50.0, "penalty_unit": unit}).penalty_modulus(law, rate, rates)
+        Physics.model_validate({"penalty": 50.0, "penalty_unit": unit}).penalty_modulus(law, rate, lambda: rates)
         for unit in ("reference", "local", "absolute")
     )
     at_reference = 164.76 / 3.0 * 100.0**-0.5  # μ = ⅓ k T^A ε̄^(n−1) at ω = 100 rad/s
     assert reference == pytest.approx(50.0 * at_reference, rel=1e-4)
     np.testing.assert_allclose(local, 50.0 * at_reference * np.array([10.0, 1.0, 10.0**-0.5]), rtol=1e-4)
     assert absolute == 50.0
-    assert Physics().penalty_modulus(law, rate, rates) == 0.0
+    assert Physics().penalty_modulus(law, rate, lambda: rates) == 0.0
 
 
 @pytest.mark.parametrize(

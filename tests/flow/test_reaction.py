@@ -241,7 +241,7 @@ def test_both_ways_on_one_and_the_same_flow() -> None:
     scene = StirringTool(motion="orbit", nodes=Rings(spacing=0.25))
     cloud = scene.cloud(law)
     operators = discretizer.operators(cloud, True)
-    modulus = PENALTY.penalty_modulus(law, scene.reference_rate, np.ones(1))
+    modulus = PENALTY.penalty_modulus(law, scene.reference_rate, lambda: np.ones(1))
     flow = Flow(cloud, operators, law, scene.boundary_velocity(cloud, law, 0.0), modulus)
     u = run(flow, Newton(), None, np.zeros(2 * len(cloud.interior)))[0].state
     without = replace(operators, strain=replace(operators.strain, areas=None))

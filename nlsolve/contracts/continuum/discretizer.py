@@ -18,13 +18,15 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, ClassVar
 
 import numpy as np
+import scipy
 import scipy.sparse as sp
 
 from nlsolve.contracts.component import Component
-from nlsolve.contracts.continuum.cloud import Cloud, node_major
+from nlsolve.contracts.continuum.cloud import Cloud, Indices, node_major
 from nlsolve.contracts.continuum.law import CONTRACTION, ConstitutiveLaw
 from nlsolve.series import Array
 
@@ -81,6 +83,13 @@ class Operators:
         """True when R is in [N/mm], the force on the material around each node."""
         return self.node_areas is not None
 
+    @cached_property
+    def strain_points_beside(self) -> Indices:
+        """The strain point nearest to each volume point, (L,); for operators with volume points only."""
+        assert self.volumetric is not None
+        nearest: Indices = scipy.spatial.cKDTree(self.strain.points).query(self.volumetric.points)[1]
+        return nearest
+
     def strain_rate(self, velocity: Array) -> Array:
         """ε̇ at the M strain points, (3, M) ordered xx, yy, xy [1/s], of the `velocity` (N, 2) of all nodes."""
         return (self.strain.rate @ velocity.ravel()).reshape(3, -1)
@@ -109,6 +118,18 @@ class Discretizer(Component, ABC):
         override `moved` too.
         """
         return None
+
+    def renewed(self, operators: Operators, cloud: Cloud) -> Operators:
+        """The operators of a cloud whose nodes have moved, those that `operators` gives: what the `neighbours` found
+        before know may save time, and changes nothing. Called only with `operators` that have neighbours. In a class
+        that overrides `operators` alone it is this one, which builds them anew.
+        """
+        return self.operators(cloud, operators.volumetric is not None)
+
+    def __init_subclass__(cls, **kwargs: Any) -> None:
+        super().__init_subclass__(**kwargs)
+        if "operators" in vars(cls) and "renewed" not in vars(cls):
+            cls.renewed = Discretizer.renewed  # type: ignore[method-assign]
 
     @abstractmethod
     def gradient(self, cloud: Cloud) -> tuple[Any, Any]:

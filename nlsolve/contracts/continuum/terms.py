@@ -8,6 +8,7 @@ switches them on.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Annotated, Any, ClassVar, Literal, Self
 
 import numpy as np
@@ -50,7 +51,9 @@ class Physics(Component):
             )
         return self
 
-    def penalty_modulus(self, law: ConstitutiveLaw, reference_rate: float, rate_squared: Array) -> float | Array:
+    def penalty_modulus(
+        self, law: ConstitutiveLaw, reference_rate: float, rate_squared: Callable[[], Array]
+    ) -> float | Array:
         """λ [MPa s]: penalty · μ at the reference rate [1/s], or penalty · μ(ε̄²) with the `rate_squared` (L,) of the
         volume points, or the penalty itself; 0 without a penalty.
         """
@@ -59,7 +62,7 @@ class Physics(Component):
         if self.penalty_unit == "absolute":
             return self.penalty
         if self.penalty_unit == "local":
-            return self.penalty * law.viscosity(rate_squared)
+            return self.penalty * law.viscosity(rate_squared())
         return self.penalty * float(law.viscosity(np.array([reference_rate**2]))[0])
 
 

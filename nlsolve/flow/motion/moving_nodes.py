@@ -55,7 +55,7 @@ class MovingNodes:
         self.discretizer, self.initial = discretizer, initial
         self.quality = 1.0
         self.searches = 0
-        self._operators: Operators
+        self._operators: Operators | None = None
         self._found: Neighbourhoods | None = None
 
     def operators(self, cloud: Cloud, volumetric: bool) -> Operators:
@@ -64,11 +64,14 @@ class MovingNodes:
 
         Raises SolveError (bad cloud) when supports fail.
         """
-        operators = None
-        if self._found is not None and self._found.parted(cloud.nodes) <= self.motion.skin:
-            operators = self.discretizer.moved(self._operators, cloud)
+        operators, last = None, self._operators
+        if last is not None and self._found is not None and self._found.parted(cloud.nodes) <= self.motion.skin:
+            operators = self.discretizer.moved(last, cloud)
         if operators is None:
-            operators = self.discretizer.operators(cloud, volumetric)
+            if last is None or last.neighbours is None:
+                operators = self.discretizer.operators(cloud, volumetric)
+            else:
+                operators = self.discretizer.renewed(last, cloud)
             keeps = self.motion.skin and operators.neighbours is not None
             self._found = Neighbourhoods(cloud) if keeps else None
             self.searches += 1

@@ -24,45 +24,50 @@ class Gradient:
     def matrices(self, sources: int) -> tuple[Any, Any]:
         """Sparse (T, sources) matrices."""
         shape = (len(self.near), sources)
-        return sparse_rows([[(self.near, self.dx)]], shape), sparse_rows([[(self.near, self.dy)]], shape)
+        return sparse_rows([(self.near, self.dx)], shape), sparse_rows([(self.near, self.dy)], shape)
 
     def strain(self, nodes: int) -> Any:
         """B (3T, 2 nodes): xx, yy, xy of ½(∇v + ᵗ∇v)."""
         u, v = 2 * self.near, 2 * self.near + 1
-        rows = [[(u, self.dx)], [(v, self.dy)], [(u, 0.5 * self.dy), (v, 0.5 * self.dx)]]
-        return sparse_rows(rows, (3 * len(self.near), 2 * nodes))
+        blocks = [(u, self.dx), (v, self.dy), (_in_turn(u, v), _in_turn(0.5 * self.dy, 0.5 * self.dx))]
+        return sparse_rows(blocks, (3 * len(self.near), 2 * nodes))
 
     def divergence(self, nodes: int) -> Any:
         """div v (T, 2 nodes)."""
-        return sparse_rows([[(2 * self.near, self.dx), (2 * self.near + 1, self.dy)]], (len(self.near), 2 * nodes))
+        block = _in_turn(2 * self.near, 2 * self.near + 1), _in_turn(self.dx, self.dy)
+        return sparse_rows([block], (len(self.near), 2 * nodes))
 
     def divergence_of_stress(self, points: int) -> Any:
         """S (2T, 3 points): ∂xx/∂x + ∂xy/∂y and ∂xy/∂x + ∂yy/∂y, node-major."""
         xx, yy, xy = self.near, self.near + points, self.near + 2 * points
-        rows = [[(xx, self.dx), (xy, self.dy)], [(xy, self.dx), (yy, self.dy)]]
-        return _node_major(sparse_rows(rows, (2 * len(self.near), 3 * points)))
+        columns, values = np.hstack([xx, xy, yy, xy]), np.hstack([self.dx, self.dy, self.dy, self.dx])
+        return _node_major(columns, values, 3 * points)
 
     def of_pressure(self, points: int) -> Any:
         """(2T, points): ∂p/∂x and ∂p/∂y, node-major."""
-        return _node_major(sparse_rows([[(self.near, self.dx)], [(self.near, self.dy)]], (2 * len(self.near), points)))
+        return _node_major(np.hstack([self.near, self.near]), np.hstack([self.dx, self.dy]), points)
 
 
-def sparse_rows(blocks: list[list[tuple[np.ndarray, np.ndarray]]], shape: tuple[int, int]) -> Any:
-    """CSR matrix of stacked blocks of rows; a block joins (columns, values) pairs, (T, k) each, side by side.
+def sparse_rows(blocks: list[tuple[np.ndarray, np.ndarray]], shape: tuple[int, int]) -> Any:
+    """CSR matrix of stacked blocks of rows, each its columns and its values, (T, k) both.
 
     The zeros that fill up smaller supports are not stored.
     """
-    columns = [np.concatenate([pair[0] for pair in block], axis=1) for block in blocks]
-    values = [np.concatenate([pair[1] for pair in block], axis=1) for block in blocks]
-    lengths = np.concatenate([np.full(len(block), block.shape[1]) for block in columns])
-    starts = np.concatenate([[0], np.cumsum(lengths)])
-    matrix = sp.csr_array(
-        (np.concatenate([v.ravel() for v in values]), np.concatenate([c.ravel() for c in columns]), starts), shape=shape
-    )
+    lengths = np.concatenate([np.full(len(columns), columns.shape[1]) for columns, _ in blocks])
+    columns = np.concatenate([columns.ravel() for columns, _ in blocks], dtype=np.int32)
+    values = np.concatenate([values.ravel() for _, values in blocks])
+    starts = np.concatenate([[0], np.cumsum(lengths)], dtype=np.int32)
+    matrix = sp.csr_array((values, columns, starts), shape=shape)
     matrix.eliminate_zeros()
     return matrix
 
 
-def _node_major(matrix: Any) -> Any:
-    """Rows x_0 … x_F, y_0 … y_F brought into the order x_0, y_0, x_1, …"""
-    return matrix[np.arange(matrix.shape[0]).reshape(2, -1).T.ravel()]
+def _in_turn(one: np.ndarray, other: np.ndarray) -> np.ndarray:
+    """The entries (T, k) of the one and the other by turns, (T, 2k)."""
+    return np.stack([one, other], axis=2).reshape(len(one), -1)
+
+
+def _node_major(columns: np.ndarray, values: np.ndarray, sources: int) -> Any:
+    """Two rows of each of T nodes, side by side in `columns` and `values` (T, 2k), as rows 2 t and 2 t + 1."""
+    rows = 2 * len(columns), columns.shape[1] // 2
+    return sparse_rows([(columns.reshape(rows), values.reshape(rows))], (rows[0], sources))

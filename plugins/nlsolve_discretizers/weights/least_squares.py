@@ -1,10 +1,11 @@
-"""f(x) ≈ Σ_i φ_i(x) f_i, φ = √w Q R^(−ᵀ) L(p) : moving least squares weights for many targets at once.
+"""f(x) ≈ Σ_i φ_i(x) f_i, φ = w P (Pᵀ w P)⁻¹ L(p) : moving least squares weights for many targets at once.
 
 At each target a polynomial, centred there and scaled by the radius of the support, is fitted to the values at k
-neighbours with weights w. With √w P = Q R (thin QR; P holds the k × c monomials) the weights of a linear functional L
-follow from one triangular solve. Q and R are built by Gram-Schmidt carried out twice, which keeps Q orthogonal to
-working precision ("twice is enough": Giraud, Langou, Rozložník 2005), for all T targets together: arrays have the
-target last.
+neighbours with weights w; P holds the k × c monomials, and L is a linear functional such as ∂/∂x at the target. The
+normal equations lose twice the digits that P has lost, which is no harm on usual supports, whose pivots are near 1.
+Where one is below `SOUND`, √w P = Q R (thin QR) gives φ = √w Q R^(−ᵀ) L(p) instead. Q and R are built by Gram-Schmidt
+carried out twice, which keeps Q orthogonal to working precision ("twice is enough": Giraud, Langou, Rozložník 2005).
+Either way is taken for all T targets together: arrays have the target last.
 Lancaster & Salkauskas (1981); Timesli et al. (2015), section 3.
 """
 
@@ -15,6 +16,8 @@ from math import factorial
 import numpy as np
 
 Derivatives = tuple[tuple[int, int], ...]
+
+SOUND = 0.05  # smallest pivot, relative to its column, with which the normal equations keep 13 digits
 
 
 def weight_function(name: str, s: np.ndarray, shape: float) -> np.ndarray:
@@ -35,19 +38,78 @@ def monomials(degree: int) -> list[tuple[int, int]]:
 def fit(
     offsets: np.ndarray, radius: np.ndarray, degree: int, derivatives: Derivatives, weight: str, shape: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """φ (D, T, k) for each of D derivatives ∂^(i+j)/∂x^i∂y^j, from neighbours at `offsets` (T, k, 2) of T targets.
+    """φ (D, T, k) for each of D derivatives ∂^(i+j)/∂x^i∂y^j, from neighbours at `offsets` (2, k, T) of T targets.
 
     Also the smallest pivot of R relative to its column, (T,): 1 for orthogonal monomials, 0 where the support does not
     determine a polynomial of `degree` and φ means nothing.
     """
-    x, y = np.ascontiguousarray((offsets / radius[:, None, None]).transpose(2, 1, 0))  # (k, T) each
-    distance = np.hypot(x, y)
-    root = np.sqrt(np.where(distance < 1.0, weight_function(weight, distance, shape), 0.0))
-    exponents = monomials(degree)
-    count, targets_count = len(exponents), x.shape[1]
+    x, y = offsets / radius
+    distance = np.sqrt(x * x + y * y)
+    w = np.where(distance < 1.0, weight_function(weight, distance, shape), 0.0)
+    phi, smallest = _by_normal_equations(x, y, w, degree, derivatives)
+    poor = np.flatnonzero(~(smallest >= SOUND))
+    if len(poor):
+        phi[..., poor], smallest[poor] = _by_orthogonal_columns(x[:, poor], y[:, poor], w[:, poor], degree, derivatives)
+    order = np.array([i + j for i, j in derivatives])
+    return (phi / radius ** order[:, None, None]).transpose(0, 2, 1), smallest
+
+
+def _by_normal_equations(
+    x: np.ndarray, y: np.ndarray, w: np.ndarray, degree: int, derivatives: Derivatives
+) -> tuple[np.ndarray, np.ndarray]:
+    """φ (D, k, T) in the scaled coordinates and the smallest pivot (T,), by elimination in Pᵀ w P z = L(p), φ = w P z.
+
+    The entries of Pᵀ w P are the moments Σ_k w x^i y^j up to twice the degree; its pivots are those of R squared.
+    """
+    exponents, high = monomials(degree), monomials(2 * degree)
+    place = {exponent: number for number, exponent in enumerate(high)}
+    weighed = np.empty((len(high), *x.shape))
+    weighed[0] = w
+    for number, (i, j) in enumerate(high[1:], start=1):
+        lower, factor = ((i - 1, j), x) if i else ((i, j - 1), y)
+        np.multiply(weighed[place[lower]], factor, out=weighed[number])
+    moments = weighed.sum(axis=1)
+    count = len(exponents)
+    system = np.zeros((count, count + len(derivatives), x.shape[1]))
+    system[:, :count] = moments[[[place[i + p, j + q] for p, q in exponents] for i, j in exponents]]
+    for d, (i, j) in enumerate(derivatives, start=count):
+        system[place[i, j], d] = factorial(i) * factorial(j)
+    size = np.maximum(system[range(count), range(count)], np.finfo(float).tiny)
+    pivots = _eliminate(system)
+    z = system[:, count:]
+    phi = np.einsum("cdt,ckt->dkt", z, weighed[:count])
+    return phi, np.sqrt((pivots / size).min(axis=0))
+
+
+def _eliminate(system: np.ndarray) -> np.ndarray:
+    """Solve A z = b for all T targets, in place: `system` (c, c + D, T) holds A, symmetric and semi-definite, of which
+    the upper triangle is used, and D columns b, which become z. Returns the pivots (c, T); z means nothing where one
+    vanishes.
+    """
+    count = len(system)
+    pivots = np.empty((count, system.shape[2]))
+    for c in range(count):
+        pivots[c] = np.maximum(system[c, c], 0.0)
+        inverse = 1.0 / np.where(pivots[c] > 0.0, pivots[c], 1.0)
+        for r in range(c + 1, count):
+            system[r, r:] -= (system[c, r] * inverse) * system[c, r:]
+        system[c, c] = inverse
+    for c in reversed(range(count)):
+        system[c, count:] *= system[c, c]
+        for r in range(c):
+            system[r, count:] -= system[r, c] * system[c, count:]
+    return pivots
+
+
+def _by_orthogonal_columns(
+    x: np.ndarray, y: np.ndarray, w: np.ndarray, degree: int, derivatives: Derivatives
+) -> tuple[np.ndarray, np.ndarray]:
+    """φ (D, k, T) in the scaled coordinates and the smallest pivot (T,), by √w P = Q R."""
+    root, exponents = np.sqrt(w), monomials(degree)
+    count, targets = len(exponents), x.shape[1]
     q = np.empty((count, *x.shape))
-    r = np.zeros((count, count, targets_count))
-    smallest = np.full(targets_count, np.inf)
+    r = np.zeros((count, count, targets))
+    smallest = np.full(targets, np.inf)
     for c, (i, j) in enumerate(exponents):
         column = root * x**i * y**j
         length = np.sqrt(np.einsum("kt,kt->t", column, column))
@@ -61,17 +123,15 @@ def fit(
         # A vanished column leaves Q undefined there; the smallest pivot tells.
         q[c] = column / np.where(r[c, c] > 0.0, r[c, c], 1.0)
     r[np.arange(count), np.arange(count)] = np.where(smallest > 0.0, r[np.arange(count), np.arange(count)], 1.0)
-    phi = [_of_functional(q, r, exponents.index(d), d, root, radius) for d in derivatives]
-    return np.stack(phi), smallest
+    z = np.stack([_of_functional(r, exponents.index(d), d) for d in derivatives])
+    return root * np.einsum("dct,ckt->dkt", z, q), smallest
 
 
-def _of_functional(
-    q: np.ndarray, r: np.ndarray, place: int, derivative: tuple[int, int], root: np.ndarray, radius: np.ndarray
-) -> np.ndarray:
-    """√w Q z with Rᵀ z = L(p): at the centre only the monomial of the derivative itself has one, i! j!."""
+def _of_functional(r: np.ndarray, place: int, derivative: tuple[int, int]) -> np.ndarray:
+    """z (c, T) with Rᵀ z = L(p): at the centre only the monomial of the derivative itself has one, i! j!."""
     i, j = derivative
-    z = np.zeros((len(q), q.shape[2]))
-    for c in range(place, len(q)):
+    z = np.zeros((len(r), r.shape[2]))
+    for c in range(place, len(r)):
         value = float(factorial(i) * factorial(j)) if c == place else 0.0
         z[c] = (value - np.einsum("bt,bt->t", r[place:c, c], z[place:c])) / r[c, c]
-    return np.ascontiguousarray((root * np.einsum("ct,ckt->kt", z, q) / radius ** (i + j)).T)
+    return z

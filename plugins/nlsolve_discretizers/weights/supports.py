@@ -11,15 +11,16 @@ import numpy as np
 import scipy
 
 from nlsolve.plugin import SolveError, Status
+from nlsolve_discretizers.weights.lists import Lists
 
 REACH = 1.5  # times the distance of the farthest neighbour: a quadrant whose nearest source lies beyond is left empty
 
 
 @dataclass(frozen=True)
 class Supports:
-    """The neighbours of T targets among the sources, nearest first.
+    """The neighbours of T targets among the sources.
 
-    index : (T, k); those of target t are its first count[t] columns.
+    index : (T, k); those of target t are its first count[t] columns, in order.
     count : (T,).
     radius : (T,) [mm], half-way to the first source that is no neighbour.
     farthest : (T,) [mm], distance of the last neighbour.
@@ -32,11 +33,17 @@ class Supports:
 
     @classmethod
     def nearest(
-        cls, sources: np.ndarray, targets: np.ndarray, count: int | np.ndarray, balanced: bool = False
+        cls,
+        sources: np.ndarray,
+        targets: np.ndarray,
+        count: int | np.ndarray,
+        balanced: bool = False,
+        lists: Lists | None = None,
     ) -> Supports:
         """The `count` nearest sources, one number or (T,). `balanced` supports grow, to twice `count` at most, until
         every quadrant around the target that has a source within REACH holds a neighbour.
 
+        lists : of one source more than `count`, where there are such.
         Raises SolveError (bad cloud) if there are too few sources.
         """
         counts = np.broadcast_to(count, len(targets))
@@ -45,19 +52,21 @@ class Supports:
             raise SolveError(
                 Status.BAD_CLOUD, f"a support of {largest} neighbours was asked for among {len(sources)} points"
             )
-        tree = scipy.spatial.cKDTree(sources)
-        distance, index = tree.query(targets, np.arange(1, largest + 2))
+        lists = Lists.of(sources, targets, largest + 1) if lists is None else lists
+        distance, index = lists.nearest()
         plain = cls._of(distance, index, counts)
         if not balanced:
             return plain
-        offsets = sources[index[:, :largest]] - targets[:, None]
-        neighbour = np.arange(largest) < counts[:, None]
-        served = np.all([(inside & neighbour).any(axis=1) for inside in _quadrants(offsets)], axis=0)
+        quadrants = _quadrants(offsets(sources, targets, index[:, :largest]))
+        neighbour = np.arange(largest)[:, None] < counts
+        served = np.all([(inside & neighbour).any(axis=0) for inside in quadrants], axis=0)
         lopsided = np.flatnonzero(~served)
+        if not len(lopsided):
+            return plain
         most = min(2 * largest, len(sources) - 1)
-        distance, index = tree.query(targets[lopsided], np.arange(1, most + 2))
-        offsets = sources[index[:, :most]] - targets[lopsided][:, None]
-        return plain.replaced(lopsided, cls._of(distance, index, _balanced(offsets, distance, counts[lopsided])))
+        distance, index = lists.query(most + 1, lopsided)
+        apart = offsets(sources, targets[lopsided], index[:, :most])
+        return plain.replaced(lopsided, cls._of(distance, index, _balanced(apart, distance, counts[lopsided])))
 
     @classmethod
     def _of(cls, distance: np.ndarray, index: np.ndarray, counts: np.ndarray) -> Supports:
@@ -66,7 +75,9 @@ class Supports:
         farthest, next_one = distance[row, counts - 1], distance[row, counts]
         # On a regular grid the two tie, and a source on the rim would weigh nothing: the rim lies just beyond it.
         radius = np.maximum(0.5 * (farthest + next_one), 1.001 * farthest)
-        return cls(index[:, : int(counts.max(initial=1))], counts, radius, farthest)
+        width = int(counts.max(initial=1))
+        beyond = (np.arange(width) >= counts[:, None]) * (int(index.max(initial=0)) + 1)
+        return cls(np.sort(index[:, :width] + beyond, axis=1) - beyond, counts, radius, farthest)
 
     @classmethod
     def within(cls, sources: np.ndarray, targets: np.ndarray, radius: float) -> Supports:
@@ -79,8 +90,8 @@ class Supports:
 
     def moved(self, sources: np.ndarray, targets: np.ndarray) -> Supports:
         """The same neighbours at other places; radii change with the farthest of them, so that no weight jumps."""
-        distance = np.linalg.norm(sources[self.index] - targets[:, None], axis=2)
-        farthest = np.where(np.arange(distance.shape[1]) < self.count[:, None], distance, 0.0).max(axis=1)
+        distance = np.hypot(*offsets(sources, targets, self.index))
+        farthest = np.where(np.arange(len(distance))[:, None] < self.count, distance, 0.0).max(axis=0)
         return replace(self, radius=self.radius * farthest / self.farthest, farthest=farthest)
 
     def replaced(self, which: np.ndarray, others: Supports) -> Supports:
@@ -93,19 +104,24 @@ class Supports:
         return Supports(index, count, radius, farthest)
 
 
+def offsets(sources: np.ndarray, targets: np.ndarray, index: np.ndarray) -> np.ndarray:
+    """x_s − x_t, (2, k, T) [mm], for the sources `index` (T, k) of each target."""
+    return np.ascontiguousarray(sources.T)[:, index.T] - targets.T[:, None]
+
+
 def _quadrants(offsets: np.ndarray) -> list[np.ndarray]:
-    """Which of the offsets (T, k, 2) lie in each closed quadrant, (T, k) each."""
-    x, y = offsets[..., 0], offsets[..., 1]
+    """Which of the offsets (2, k, T) lie in each closed quadrant, (k, T) each."""
+    x, y = offsets
     return [(x >= 0) & (y >= 0), (x <= 0) & (y >= 0), (x <= 0) & (y <= 0), (x >= 0) & (y <= 0)]
 
 
 def _balanced(offsets: np.ndarray, distance: np.ndarray, counts: np.ndarray) -> np.ndarray:
-    """Counts (T,) that include the nearest source of every quadrant, if within REACH, for offsets (T, most, 2)."""
+    """Counts (T,) that include the nearest source of every quadrant, if within REACH, for offsets (2, most, T)."""
     row = np.arange(len(counts))
     rim = REACH * distance[row, counts - 1]
     needed = counts.copy()
     for quadrant in _quadrants(offsets):
-        first = quadrant.argmax(axis=1)
-        reachable = quadrant[row, first] & (distance[row, first] <= rim)
+        first = quadrant.argmax(axis=0)
+        reachable = quadrant[first, row] & (distance[row, first] <= rim)
         needed = np.where(reachable, np.maximum(needed, first + 1), needed)
     return needed

@@ -14,21 +14,23 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-import scipy
 import scipy.sparse as sp
 
 from nlsolve.plugin import Cloud, PointOperators, SolveError, Status, hat_gradients
+from nlsolve_discretizers.weights import delaunay
 
 
 @dataclass(frozen=True)
 class Triangles:
     """Triangles (T, 3) of a cloud, counter-clockwise, without those that span a hole or lie along a wall.
 
+    whole : Delaunay's triangulation (T′, 3), with these.
     found : the same triangles on the cloud where they were found; None if its nodes have not moved since.
     """
 
     cloud: Cloud
     corners: np.ndarray
+    whole: np.ndarray
     found: Triangles | None = None
 
     @classmethod
@@ -37,23 +39,23 @@ class Triangles:
 
         Raises SolveError (bad cloud) if the nodes lie on one line or a node belongs to no triangle.
         """
-        try:
-            corners = scipy.spatial.Delaunay(cloud.nodes).simplices
-        except scipy.spatial.QhullError as error:
-            raise SolveError(Status.BAD_CLOUD, "the nodes lie on one line: they span no triangles") from error
-        group = np.zeros(len(cloud.nodes), dtype=int)
-        for number, members in enumerate(cloud.boundaries.values(), start=1):
-            group[members] = number
-        groups = group[corners]
-        along_wall = (groups[:, 0] > 0) & (groups[:, 0] == groups[:, 1]) & (groups[:, 0] == groups[:, 2])
-        triangles = cls(cloud, corners[~along_wall])
-        if np.bincount(triangles.corners.ravel(), minlength=len(group))[cloud.interior].min(initial=1) == 0:
+        return cls._of(cloud, delaunay.found(cloud.nodes))
+
+    def renewed(self, cloud: Cloud) -> Triangles:
+        """The triangulation of a cloud whose nodes have moved, as `of` gives it; after a small motion in less time."""
+        whole = delaunay.kept(self.whole, cloud.nodes, _walls(cloud))
+        return self.of(cloud) if whole is None else self._of(cloud, whole)
+
+    @classmethod
+    def _of(cls, cloud: Cloud, whole: np.ndarray) -> Triangles:
+        triangles = cls(cloud, whole[~delaunay.on_one_wall(_walls(cloud)[whole.T])], whole)
+        if np.bincount(triangles.corners.ravel(), minlength=len(cloud.nodes))[cloud.interior].min(initial=1) == 0:
             raise SolveError(Status.BAD_CLOUD, "a node belongs to no triangle of the cloud: it coincides with another")
         return triangles
 
     def moved_to(self, cloud: Cloud) -> Triangles:
         """The same triangles, edges and patches with the nodes at other places."""
-        return Triangles(cloud, self.corners, self.found or self)
+        return Triangles(cloud, self.corners, self.whole, self.found or self)
 
     @property
     def are_upright(self) -> bool:
@@ -63,8 +65,7 @@ class Triangles:
     @cached_property
     def areas(self) -> np.ndarray:
         """Area of each triangle [mm²]."""
-        a, b, c = (self.cloud.nodes[self.corners[:, i]] for i in range(3))
-        return 0.5 * ((b[:, 0] - a[:, 0]) * (c[:, 1] - a[:, 1]) - (b[:, 1] - a[:, 1]) * (c[:, 0] - a[:, 0]))
+        return 0.5 * delaunay.doubled_areas(*np.ascontiguousarray(self.cloud.nodes.T), *self.corners.T)
 
     @cached_property
     def edges(self) -> tuple[np.ndarray, np.ndarray]:
@@ -82,11 +83,15 @@ class Triangles:
         beside[twice, 1] = owner[order[first[twice] + 1]]
         return sides[order[first]], beside
 
-    def midpoints(self) -> np.ndarray:
-        """Midpoints of the edges that have an end inside, (M, 2): the stress points between neighbours."""
+    @cached_property
+    def inner_edges(self) -> np.ndarray:
+        """The edges that have an end inside, (M, 2)."""
         ends, _ = self.edges
-        inner = ~self.cloud.on_boundary[ends].all(axis=1)
-        return self.cloud.nodes[ends[inner]].mean(axis=1)
+        return ends[~self.cloud.on_boundary[ends].all(axis=1)]
+
+    def midpoints(self) -> np.ndarray:
+        """Midpoints of the inner edges, (M, 2): the stress points between neighbours."""
+        return self.cloud.nodes[self.inner_edges].mean(axis=1)
 
     @cached_property
     def patch(self) -> np.ndarray:
@@ -168,6 +173,14 @@ class Triangles:
         dilatation = (sp.diags_array(1.0 / patch_areas) @ net_flux).tocsr()
         centres = np.stack([np.bincount(patch, areas * c, count) / patch_areas for c in self.centroids().T], axis=1)
         return Patches(self, dilatation, net_flux, patch_areas, centres)
+
+
+def _walls(cloud: Cloud) -> np.ndarray:
+    """The number of the boundary of each node, (N,), 0 inside."""
+    walls = np.zeros(len(cloud.nodes), dtype=int)
+    for number, members in enumerate(cloud.boundaries.values(), start=1):
+        walls[members] = number
+    return walls
 
 
 @dataclass(frozen=True)

@@ -53,7 +53,7 @@ class Slipping(ConstitutiveLaw):
 
 
 def test_a_law_that_gives_off_power_is_doubted_by_the_run() -> None:
-    found = row(Manufactured(spacing=0.15), law=Donor(share=5.0), start=AT_ONCE)
+    found = row(Manufactured(spacing=0.15), law=Donor(share=8.0), start=AT_ONCE)
     assert found["status"] == "converged"
     assert found["audit.gained_power"] > 0.0
     assert "the law 'donor' gives off power, S:ε̇ < 0, at " in found["doubt"]
@@ -219,7 +219,7 @@ def test_claims_are_audited_where_the_other_audits_cannot_be_made() -> None:
         def gradient(self, cloud: Cloud) -> Any:
             raise SolveError(Status.BAD_CLOUD, "inside out")
 
-    found = row(Manufactured(spacing=0.15), law=Donor(share=5.0), start=AT_ONCE, discretizer=Fails())
+    found = row(Manufactured(spacing=0.15), law=Donor(share=8.0), start=AT_ONCE, discretizer=Fails())
     assert found["doubt"].startswith("the audits could not be made: inside out; the law 'donor' gives off power")
 
 

@@ -10,6 +10,7 @@ from cases import setup
 from clouds import CLOUDS, jittered_points
 from nlsolve_discretizers import LinearTriangles, MovingLeastSquares, RadialBasis
 from nlsolve_discretizers.collocation import GRADIENT
+from nlsolve_discretizers.weights.neighbours import Neighbours
 from nlsolve_discretizers.weights.supports import Supports
 from nlsolve_discretizers.weights.triangles import Triangles
 from nlsolve_rules.refresh import PoorContraction
@@ -140,7 +141,8 @@ def test_a_kept_support_that_has_become_weak_is_enlarged() -> None:
     sources = np.stack([x.ravel(), y.ravel()], axis=1)
     target = np.array([[4.2, 4.0]])
     line = Supports(np.flatnonzero(sources[:, 1] == 4.0)[None], np.array([9]), np.array([5.0]), np.array([4.2]))
-    supports, (dx, dy) = MovingLeastSquares().weights(sources, target, "strain", GRADIENT, kept=line)
+    near = Neighbours(Triangles.of(Cloud(sources, {})), {"strain": line})
+    supports, (dx, dy) = MovingLeastSquares().weights(sources, target, "strain", GRADIENT, near=near)
     assert supports.count[0] > 9
     linear = sources @ [2.0, -3.0]
     np.testing.assert_allclose([dx @ linear[supports.index[0]], dy @ linear[supports.index[0]]], [[2.0], [-3.0]])

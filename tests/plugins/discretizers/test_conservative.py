@@ -72,7 +72,7 @@ def test_a_patch_held_by_walls_is_joined_to_a_neighbour() -> None:
     other = np.flatnonzero((nodes.max(axis=1) == 1.0) & (nodes.min(axis=1) > 0.0))
     cloud = Cloud(nodes, {"bottom": low, "left": left, "rest": other})
     corners = np.array([[0, 1, 5], [1, 6, 5], [1, 2, 6], [2, 7, 6], [5, 6, 10], [6, 11, 10]])
-    held = Triangles(cloud, corners)
+    held = Triangles(cloud, corners, corners)
     assert cloud.on_boundary[corners[0]].all()
     alone = np.arange(len(corners))
     _, beside = held.edges

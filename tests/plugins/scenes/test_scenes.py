@@ -225,14 +225,14 @@ def test_channel_profile_carries_the_mean_speed_and_balances_its_force(index: fl
 def test_penalty_is_measured_in_the_viscosity_at_the_reference_rate() -> None:
     law = PowerLaw(index=0.3)
     rate = StirringTool().reference_rate
-    assert Physics(penalty=50.0).penalty_modulus(law, rate, np.zeros(1)) == pytest.approx(
+    assert Physics(penalty=50.0).penalty_modulus(law, rate, lambda: np.zeros(1)) == pytest.approx(
         50.0 * law.viscosity(np.array([1e4]))[0]
     )
     rates = np.array([4.0, 9.0])
-    local = Physics(penalty=50.0, penalty_unit="local").penalty_modulus(law, rate, rates)
+    local = Physics(penalty=50.0, penalty_unit="local").penalty_modulus(law, rate, lambda: rates)
     np.testing.assert_array_equal(local, 50.0 * law.viscosity(rates))
-    assert Physics(penalty=50.0, penalty_unit="absolute").penalty_modulus(law, rate, rates) == 50.0
-    assert Physics().penalty_modulus(law, rate, rates) == 0.0
+    assert Physics(penalty=50.0, penalty_unit="absolute").penalty_modulus(law, rate, lambda: rates) == 50.0
+    assert Physics().penalty_modulus(law, rate, lambda: rates) == 0.0
 
 
 def test_increments_of_a_march() -> None:

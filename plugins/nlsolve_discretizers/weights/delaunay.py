@@ -1,0 +1,122 @@
+"""No node lies inside the circle through the corners of a triangle : Delaunay's triangulation, found and kept.
+
+Nodes that move a little change a few of its edges. In the triangulation of before, an edge ab between the triangles abc
+and bad is wrong where d lies inside the circle of abc; the other diagonal cd takes its place (Lawson 1977). Where every
+edge is right and the hull convex, no node lies in any circle (Delaunay 1934), and the triangulation is the only one.
+Four nodes on one circle have two: there, and where nodes have moved too far, it is found anew.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import scipy
+
+from nlsolve.plugin import SolveError, Status
+
+TIE = 1e-11  # relative to the size of the coordinates: where rounding may decide which of two diagonals is found
+MOST_ROUNDS = 20  # of flips, before the triangulation is found anew
+
+
+def found(nodes: np.ndarray) -> np.ndarray:
+    """Corners (T, 3) of the triangles of `nodes` (N, 2), counter-clockwise, in the order of `ordered`.
+
+    Raises SolveError (bad cloud) if the nodes lie on one line.
+    """
+    try:
+        return ordered(scipy.spatial.Delaunay(nodes).simplices.astype(np.intp))
+    except scipy.spatial.QhullError as error:
+        raise SolveError(Status.BAD_CLOUD, "the nodes lie on one line: they span no triangles") from error
+
+
+def ordered(corners: np.ndarray) -> np.ndarray:
+    """The triangles with their least corner first, in the order of their corners: no trace of how they were found."""
+    first, count = corners.argmin(axis=1), np.int64(corners.max()) + 1
+    turned = corners[np.arange(len(corners))[:, None], (first[:, None] + np.arange(3)) % 3]
+    a, b, c = turned.T
+    return turned[np.argsort((a * count + b) * count + c)]
+
+
+def kept(corners: np.ndarray, nodes: np.ndarray, walls: np.ndarray) -> np.ndarray | None:
+    """The triangles that `found` would give, by flips in those of before (T, 3); None where these do not lead there.
+
+    walls : (N,), the number of the wall of each node, 0 inside. Between nodes of one wall any diagonal will do.
+    """
+    x, y = np.ascontiguousarray(nodes.T)
+    tie = TIE * float((x * x + y * y).max())
+    if (doubled_areas(x, y, *corners.T) <= 0.0).any():
+        return None
+    corners, flipped = corners.copy(), False
+    for _ in range(MOST_ROUNDS):
+        quads, beside, hull = quadrilaterals(corners)
+        if not flipped and not _is_convex(hull, x, y, walls, tie):
+            return None
+        inside, size = _in_circle(x[quads], y[quads])
+        doubtful = np.flatnonzero(inside >= -tie * size)
+        unsure = inside[doubtful] <= tie * size[doubtful]
+        if not on_one_wall(walls[quads[:, doubtful[unsure]]]).all():
+            return None
+        wrong = doubtful[~unsure]
+        if not len(wrong):
+            return ordered(corners) if flipped else corners
+        chosen = wrong[_alone(beside[:, wrong], len(corners))]
+        (a, b, c, d), (one, other) = quads[:, chosen], beside[:, chosen]
+        corners[one], corners[other] = np.stack([a, d, c], axis=1), np.stack([d, b, c], axis=1)
+        if (doubled_areas(x, y, *corners[[*one, *other]].T) <= 0.0).any():
+            return None
+        flipped = True
+    return None
+
+
+def doubled_areas(x: np.ndarray, y: np.ndarray, a: np.ndarray, b: np.ndarray, c: np.ndarray) -> np.ndarray:
+    """Twice the signed areas of the triangles abc of nodes at x, y (N,)."""
+    return (x[b] - x[a]) * (y[c] - y[a]) - (y[b] - y[a]) * (x[c] - x[a])
+
+
+def quadrilaterals(corners: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """For every inner edge ab the nodes a, b, c, d (4, E) of the triangles abc and bad, and these two (2, E); and the
+    edges (2, H) of the hull. All go counter-clockwise.
+    """
+    start, end = corners.ravel(), corners[:, [1, 2, 0]].ravel()
+    key = np.minimum(start, end) * (int(corners.max()) + 1) + np.maximum(start, end)
+    order = np.argsort(key, kind="stable")
+    again = np.flatnonzero(key[order[1:]] == key[order[:-1]])
+    one, other = order[again], order[again + 1]
+    single = np.ones(len(key), dtype=bool)
+    single[one] = single[other] = False
+    apex = corners[:, [2, 0, 1]].ravel()
+    quads = np.stack([start[one], end[one], apex[one], apex[other]])
+    return quads, np.stack([one // 3, other // 3]), np.stack([start[single], end[single]])
+
+
+def _in_circle(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """A determinant that is positive where d lies inside the circle of abc, for quadrilaterals at x, y (4, E), and the
+    square of the largest distance from d.
+
+    It is twice the area of abc times the power of d: squared radius less squared distance from the centre.
+    """
+    (ax, bx, cx), (ay, by, cy) = x[:3] - x[3], y[:3] - y[3]
+    a, b, c = ax * ax + ay * ay, bx * bx + by * by, cx * cx + cy * cy
+    determinant = a * (bx * cy - by * cx) + b * (cx * ay - cy * ax) + c * (ax * by - ay * bx)
+    return determinant, np.maximum(np.maximum(a, b), c)
+
+
+def on_one_wall(walls: np.ndarray) -> np.ndarray:
+    """Which of the polygons with nodes on `walls` (corners, E) have all of them on one and the same."""
+    return (walls[0] > 0) & (walls == walls[0]).all(axis=0)
+
+
+def _alone(beside: np.ndarray, triangles: int) -> np.ndarray:
+    """Which of the edges with triangles `beside` (2, E) are the first of both of these: no two share a triangle."""
+    number = np.arange(beside.shape[1])
+    first = np.full(triangles, len(number))
+    np.minimum.at(first, beside.ravel(), np.tile(number, 2))
+    return (first[beside] == number).all(axis=0)
+
+
+def _is_convex(hull: np.ndarray, x: np.ndarray, y: np.ndarray, walls: np.ndarray, tie: float) -> bool:
+    """Whether the edges (2, H) of the hull turn left at every node; along one wall they may go straight on."""
+    following = np.zeros(len(x), dtype=np.intp)
+    following[hull[0]] = hull[1]
+    corner = np.stack([*hull, following[hull[1]]])
+    least = np.where(on_one_wall(walls[corner]), -tie, tie)
+    return bool((doubled_areas(x, y, *corner) > least).all())

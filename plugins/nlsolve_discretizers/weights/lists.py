@@ -1,0 +1,116 @@
+"""|x_s − x_t| ≥ r − Σ (|δx_t| + max_s |δx_s|) : the nearest sources of each target, listed once and ranked anew.
+
+A source that was farther than r from a target cannot have come nearer than that; lists with a few more sources than are
+needed therefore hold the nearest ones until the motion has used up the rest (Verlet 1967).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+import scipy
+
+SPARE = 8
+"""Sources that are listed beyond those needed, where a motion is to follow."""
+
+TIE = 1e-12
+"""Two sources are equally near whose distances differ by less, relatively: the tree decides which is the last one."""
+
+
+@dataclass(frozen=True)
+class Lists:
+    """The nearest sources of T targets.
+
+    sources, targets : their places (S, 2) and (T, 2) [mm].
+    index, distance : (T, K), nearest first; −1 for a source that is no more, at an infinite distance.
+    reach : (T,) [mm], every source nearer than this is listed.
+    count : how many of the nearest are sure to be listed, all sources at most.
+    """
+
+    sources: np.ndarray
+    targets: np.ndarray
+    index: np.ndarray
+    distance: np.ndarray
+    reach: np.ndarray
+    count: int
+
+    @classmethod
+    def of(cls, sources: np.ndarray, targets: np.ndarray, count: int, spare: int = 0) -> Lists:
+        """The `count` nearest sources, and some to spare."""
+        none = np.zeros((len(targets), min(count + spare, len(sources))))
+        nothing = cls(sources, targets, none.astype(np.intp), none, none[:, 0], min(count, len(sources)))
+        return nothing._listed_anew(np.arange(len(targets)))
+
+    def moved(
+        self,
+        sources: np.ndarray,
+        targets: np.ndarray,
+        sources_before: np.ndarray | None = None,
+        targets_before: np.ndarray | None = None,
+    ) -> Lists:
+        """The nearest sources at other places.
+
+        sources_before, targets_before : the number that each of them had, −1 for new ones; None: the same as now.
+        """
+        index, reach = self.index, self.reach - _steps(self.sources, sources, sources_before).max(initial=0.0)
+        if targets_before is not None:
+            index, reach = index[targets_before], np.where(targets_before < 0, -np.inf, reach[targets_before])
+        reach = reach - _steps(self.targets, targets, targets_before)
+        if sources_before is not None:
+            index = _numbers_now(sources_before, len(self.sources))[index]
+            new = sources[sources_before < 0]
+            if len(new):
+                reach = np.minimum(reach, scipy.spatial.cKDTree(new).query(targets)[0])
+        (x, y), (u, v) = np.ascontiguousarray(sources.T), targets.T[..., None]
+        squared = (x[index] - u) ** 2 + (y[index] - v) ** 2
+        squared[index < 0] = np.inf
+        order, row = np.argsort(squared, axis=1), np.arange(len(targets))[:, None]
+        index, distance = index[row, order], np.sqrt(squared[row, order])
+        now = Lists(sources, targets, index, distance, reach, self.count)
+        return now._listed_anew(np.flatnonzero(~(distance[:, self.count - 1] < reach)))
+
+    def _listed_anew(self, which: np.ndarray) -> Lists:
+        """These lists, with those of the targets `which` from the tree."""
+        if not len(which):
+            return self
+        listed = self.index.shape[1]
+        index, distance, reach = self.index.copy(), self.distance.copy(), self.reach.copy()
+        distance[which], index[which] = self.query(listed, which)
+        reach[which] = distance[which, -1] if listed < len(self.sources) else np.inf
+        return replace(self, index=index, distance=distance, reach=reach)
+
+    def nearest(self) -> tuple[np.ndarray, np.ndarray]:
+        """Distances and numbers of the `count` nearest sources of all targets, (T, count) each."""
+        distance, index = self.distance[:, : self.count], self.index[:, : self.count]
+        tied = np.flatnonzero(distance[:, -2:-1].sum(axis=1) >= (1.0 - TIE) * distance[:, -1])
+        if len(tied):
+            distance, index = distance.copy(), index.copy()
+            distance[tied], index[tied] = self.query(self.count, tied)
+        return distance, index
+
+    def query(self, count: int, which: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Distances and numbers of the `count` nearest sources of the targets `which`, (W, count) each, by the tree."""
+        distance, index = self.tree.query(self.targets[which], np.arange(1, count + 1))
+        return distance, index
+
+    @cached_property
+    def tree(self) -> scipy.spatial.cKDTree:
+        """The tree of the sources."""
+        return scipy.spatial.cKDTree(self.sources)
+
+
+def _steps(before: np.ndarray, now: np.ndarray, numbers: np.ndarray | None) -> np.ndarray:
+    """|δx| of the places `now` (P, 2), 0 for new ones."""
+    if numbers is None:
+        return np.linalg.norm(now - before, axis=1)
+    return np.where(numbers < 0, 0.0, np.linalg.norm(now - before[numbers], axis=1))
+
+
+def _numbers_now(numbers_before: np.ndarray, count_before: int) -> np.ndarray:
+    """The number now of each that there was before, −1 for those that are no more and, at the end, for number −1."""
+    now = np.full(count_before + 1, -1)
+    old = np.flatnonzero(numbers_before >= 0)
+    now[numbers_before[old]] = old
+    return now
