@@ -13,6 +13,7 @@ from nlsolve.contracts.continuum.discretizer import Discretizer
 from nlsolve.contracts.continuum.law import ConstitutiveLaw
 from nlsolve.contracts.linear_solver import LinearSolver
 from nlsolve.contracts.nonlinear_solver import NonlinearSolver
+from nlsolve.contracts.recording import SystemStart
 from nlsolve.contracts.rules.globalization import Globalization
 from nlsolve.contracts.rules.homotopy_form import HomotopyForm
 from nlsolve.contracts.rules.operator import IterationOperator
@@ -45,10 +46,10 @@ from nlsolve.testing.toy_problem import DenseLU, ToyProblem
 def check_simulation(scene: Scene, parts: Any = None) -> None:
     """Check that a scene builds its simulation, and that the problem of its sample has its Jacobian and series.
 
-    parts : the components of its sections; without them it gets a linear solver only.
+    parts : the components of its sections; without them it gets a linear solver, and the start of a system.
     """
     with promise("simulation", "the scene builds a Simulation"):
-        given = SimpleNamespace(scene=scene, linear=DenseLU()) if parts is None else parts
+        given = SimpleNamespace(scene=scene, linear=DenseLU(), start=SystemStart()) if parts is None else parts
         simulation = scene.simulation(given, lambda kind: nullcontext())
         told = f"simulation() gave a {type(simulation).__name__}, not a Simulation"
         require(isinstance(simulation, Simulation), told)
