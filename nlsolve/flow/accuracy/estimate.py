@@ -1,4 +1,4 @@
-"""‖V* − V‖₂/‖V‖₂ over the interior nodes: the error of a solved flow, by solutions on its cloud and on an enriched one.
+"""‖V* − V‖₂/‖V*‖₂ over the interior nodes: the error of a solved flow, by solutions on its cloud and on an enriched one.
 
     V* = V_fine + ⅓ (V_fine − V_coarse)
 
@@ -52,8 +52,8 @@ RICHARDSON = 1.0 / 3.0
 class Comparison:
     """A velocity V (N, 2) beside the better one V* at the same nodes.
 
-    relative : ‖V* − V‖₂/‖V‖₂ over the interior nodes.
-    worst : the largest |V* − V| there over the largest |V| of all nodes.
+    relative : ‖V* − V‖₂/‖V*‖₂ over the interior nodes.
+    worst : the largest |V* − V| there over the largest |V*| of all nodes.
     factorizations : matrices factorised for it.
     """
 
@@ -87,8 +87,8 @@ def compared(state: FlowState, velocity: Array, before: Array | None) -> Compari
     best = fine[: len(velocity)] + RICHARDSON * (fine[: len(velocity)] - coarse)
     error = (best - velocity)[inside]
     return Comparison(
-        float(np.linalg.norm(error) / np.linalg.norm(velocity[inside])),
-        float(np.linalg.norm(error, axis=1).max() / np.linalg.norm(velocity, axis=1).max()),
+        float(np.linalg.norm(error) / np.linalg.norm(best[inside])),
+        float(np.linalg.norm(error, axis=1).max() / np.linalg.norm(best, axis=1).max()),
         work.counts["factorization"],
     )
 
