@@ -2,7 +2,8 @@
 
     python benchmarks/operators.py [repeats]
 
-Prints median seconds of B and S on graded rings of 2 000 to 100 000 nodes with the exponent of their growth, and the
+Prints what the operators of a cloud cost whose nodes have moved a little, each built alone and each from the one
+before; median seconds of B and S on graded rings of 2 000 to 100 000 nodes with the exponent of their growth, and the
 share of triangulation and neighbour search; on the 2015 paper's 1780 nodes the ratio to one factorisation; and, where
 the library `rbf` is installed (pip install treverhines-rbf), seconds of both for the same first-derivative weights:
 r³, degree 2 and 3, the same supports, targets between the same nodes.
@@ -11,6 +12,8 @@ r³, degree 2 and 3, the same supports, targets between the same nodes.
 from __future__ import annotations
 
 import sys
+import time
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -22,6 +25,8 @@ from threadpoolctl import threadpool_limits
 
 import nlsolve
 from nlsolve.flow.momentum import Flow
+from nlsolve.flow.motion.moving_nodes import MovingNodes
+from nlsolve.plugin import NodeMotion, Operators
 
 try:
     from rbf.pde.fd import weight_matrix
@@ -51,6 +56,47 @@ def preparation(discretizer: Any, cloud: nlsolve.Cloud) -> None:
     if isinstance(discretizer, Collocation):
         discretizer.supports(cloud.nodes, points, "strain", cloud)
         discretizer.supports(points, cloud.nodes[cloud.interior], "force", cloud)
+
+
+def stirred(case: Any, increments: int) -> Iterator[nlsolve.Cloud]:
+    """The cloud of a scene, and after each increment: nodes follow the exact velocity of the spin at their places."""
+    cloud = case.scene.cloud(case.law)
+    moving = MovingNodes(case.scene, NodeMotion(nodes="lagrangian"), case.time.increment, case.discretizer, cloud)
+    yield cloud
+    for k in range(1, increments + 1):
+        velocity = case.scene.exact(case.law, cloud.nodes, 0.0).velocity
+        cloud, _ = moving.move(cloud, velocity, None, k * case.time.increment)
+        yield cloud
+
+
+def of_moved_clouds(increments: int) -> None:
+    """Print median seconds of the operators of the clouds of a march, each built alone and each from the one before."""
+    print("\nmoved clouds           nodes      alone   from the one before   ratio   the very same")
+    for nodes in (PAPER, {"kind": "graded-rings", "first": 0.08, "growth": 0.1, "spacing": 0.12}):
+        for kind in KINDS:
+            case = setup(kind, nodes)
+            discretizer = case.discretizer.for_law(case.law, case.scene.reference_rate)
+            before, seconds, same = None, [], 0
+            for cloud in stirred(case, increments):
+                began = time.process_time()
+                alone = discretizer.operators(cloud, True)
+                built = time.process_time()
+                if before is not None:
+                    before = discretizer.renewed(before, cloud)
+                    seconds.append((built - began, time.process_time() - built))
+                    pairs = zip(_matrices(before), _matrices(alone), strict=True)
+                    same += all((one != other).nnz == 0 for one, other in pairs)
+                before = before or alone
+            anew, renewed = np.median(seconds, axis=0)
+            print(
+                f"  {kind:9s} {len(cloud.nodes):16d} {1e3 * anew:7.1f} ms {1e3 * renewed:18.1f} ms "
+                f"{anew / renewed:7.2f} {same:8d} of {increments}",
+                flush=True,
+            )
+
+
+def _matrices(operators: Operators) -> tuple[Any, Any]:
+    return operators.strain.rate, operators.strain.force
 
 
 def growth(repeats: int) -> None:
@@ -126,6 +172,7 @@ def against_another_library(repeats: int) -> None:
 if __name__ == "__main__":
     count = int(sys.argv[1]) if len(sys.argv) > 1 else 5
     with threadpool_limits(limits=1):
+        of_moved_clouds(5 * count)
         against_another_library(3 * count)
         against_factorization(3 * count)
         growth(max(1, count // 3))

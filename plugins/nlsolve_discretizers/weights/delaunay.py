@@ -3,7 +3,8 @@
 Nodes that move a little change a few of its edges. In the triangulation of before, an edge ab between the triangles abc
 and bad is wrong where d lies inside the circle of abc; the other diagonal cd takes its place (Lawson 1977). Where every
 edge is right and the hull convex, no node lies in any circle (Delaunay 1934), and the triangulation is the only one.
-Four nodes on one circle have two: there, and where nodes have moved too far, it is found anew.
+Four nodes on one circle have two, and the diagonal that was there stays. Where nodes have moved too far, all is found
+anew.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ import scipy
 
 from nlsolve.plugin import SolveError, Status
 
-TIE = 1e-11  # relative to the size of the coordinates: where rounding may decide which of two diagonals is found
+TIE = 1e-11  # relative to the size of the coordinates: four nodes are on one circle, as far as rounding can tell
 MOST_ROUNDS = 20  # of flips, before the triangulation is found anew
 
 
@@ -39,7 +40,7 @@ def ordered(corners: np.ndarray) -> np.ndarray:
 def kept(corners: np.ndarray, nodes: np.ndarray, walls: np.ndarray) -> np.ndarray | None:
     """The triangles that `found` would give, by flips in those of before (T, 3); None where these do not lead there.
 
-    walls : (N,), the number of the wall of each node, 0 inside. Between nodes of one wall any diagonal will do.
+    walls : (N,), the number of the wall of each node, 0 inside.
     """
     x, y = np.ascontiguousarray(nodes.T)
     tie = TIE * float((x * x + y * y).max())
@@ -51,11 +52,7 @@ def kept(corners: np.ndarray, nodes: np.ndarray, walls: np.ndarray) -> np.ndarra
         if not flipped and not _is_convex(hull, x, y, walls, tie):
             return None
         inside, size = _in_circle(x[quads], y[quads])
-        doubtful = np.flatnonzero(inside >= -tie * size)
-        unsure = inside[doubtful] <= tie * size[doubtful]
-        if not on_one_wall(walls[quads[:, doubtful[unsure]]]).all():
-            return None
-        wrong = doubtful[~unsure]
+        wrong = np.flatnonzero(inside > tie * size)
         if not len(wrong):
             return ordered(corners) if flipped else corners
         chosen = wrong[_alone(beside[:, wrong], len(corners))]
