@@ -1,4 +1,4 @@
-"""‖V* − V‖₂/‖V*‖₂ over the interior nodes: the error of a solved flow, by solutions on its cloud and on an enriched one.
+"""‖V* − V‖₂/‖V*‖₂ over the interior nodes: the error of a solved flow, by solutions on its cloud and an enriched one.
 
     V* = V_fine + ⅓ (V_fine − V_coarse)
 
