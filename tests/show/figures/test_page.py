@@ -29,7 +29,7 @@ def declared(page: str) -> list[dict[str, Any]]:
 
 
 def test_the_data_shown_are_those_that_are_written(page: str) -> None:
-    (shown,) = re.findall(r"```csv\n(.*?)```", page, re.DOTALL)
+    (shown,) = re.findall(r"```text\n(curve,.*?)```", page, re.DOTALL)
     results = nlsolve.run(declared(page)[0], isolation="none")
     (spec,) = results.study.figures
     _, data = drawn(spec, results.frames)
