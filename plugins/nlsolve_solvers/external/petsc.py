@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import warnings
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
 import numpy as np
@@ -69,7 +69,8 @@ class Snes:
             self._snes.setTRTolerances(delta_0=self._radius * (float(np.linalg.norm(start)) or 1.0))
         before = _log()
         try:
-            self._snes.solve(None, self._u)
+            with _logged():
+                self._snes.solve(None, self._u)
         except Exception:  # PETSc's own error, or its wrapping of what a callback of ours raised, which is raised below
             if served.error is None:
                 raise
@@ -93,8 +94,28 @@ class Snes:
         return f"SNES, {self._snes.getType()}: {reasons[reason]}" if gave_up else ""
 
 
+_stages = [0]  # of PETSc's log, the last one in use
+
+
+@contextlib.contextmanager
+def _logged() -> Iterator[None]:
+    """A run whose events are counted. One that an error ends leaves its events open, and PETSc counts no open event
+    again in that stage of its log: the next run gets another.
+    """
+    stage = PETSc.Log.Stage(f"{PREFIX}{_stages[-1]}")
+    stage.push()
+    try:
+        yield
+    except BaseException:
+        _stages[-1] += 1
+        raise
+    finally:
+        stage.pop()
+
+
 def _log() -> dict[str, float]:
-    return {name: PETSc.Log.Event(event).getPerfInfo()["count"] for name, event in EVENTS.items()}
+    stage = PETSc.Log.Stage(f"{PREFIX}{_stages[-1]}").id
+    return {name: PETSc.Log.Event(event).getPerfInfo(stage)["count"] for name, event in EVENTS.items()}
 
 
 class _Calls:

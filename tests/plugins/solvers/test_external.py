@@ -18,6 +18,7 @@ from pydantic import ValidationError
 
 import nlsolve
 from nlsolve import SolveError, Status
+from nlsolve.algebra.formula import FormulaProblem
 from nlsolve.algebra.measure import ByScale
 from nlsolve.contracts.outcome import Outcome
 from nlsolve.plugin import NonlinearSolver, RefreshRule
@@ -176,6 +177,17 @@ def test_a_peer_reports_what_was_observed_with_a_new_tangent_each_time(solver: A
             assert reported(outcome, name) <= observed
         else:
             assert reported(outcome, name) == observed, name
+
+
+@needs_petsc
+def test_an_error_inside_snes_leaves_the_counts_of_later_runs_alone() -> None:
+    """PETSc leaves an event open that an error ends, and counts it no more in that stage of its log."""
+    singular = FormulaProblem(lambda u: u**2 - 2.0 * u, 1)
+    failed, _ = run(singular, PetscSnes(), EveryIteration(), np.array([1.0]), stop=STOP)
+    assert failed.status is Status.SINGULAR_TANGENT
+    flow = spin_flow(0.5)
+    outcome, ledger = run(flow, PetscSnes(), EveryIteration(), near(flow, 0.52), stop=STOP)
+    assert reported(outcome, "reported_factorizations") == ledger.counts["factorization"] > 0
 
 
 @pytest.mark.parametrize("solver", PEERS)
