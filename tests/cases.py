@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any
 
+import numpy as np
 from nlsolve_discretizers import MovingLeastSquares
 from nlsolve_laws import Bingham, CarreauYasuda, Cross, HerschelBulkley, NortonHoff, PowerLaw, SellarsTegart
 from nlsolve_linear.superlu import SuperLU
@@ -14,7 +15,9 @@ from nlsolve_rules.refresh import EveryIteration
 from nlsolve_scenes import StirringTool
 from nlsolve_scenes.nodes.rings import Rings
 from nlsolve_solvers import Newton
+from nlsolve_systems import Published
 
+from nlsolve.algebra.formula import FormulaProblem
 from nlsolve.contracts.continuum.geometry import Geometry
 from nlsolve.contracts.outcome import Outcome
 from nlsolve.contracts.recording import IterateRecording, SystemStart
@@ -137,3 +140,15 @@ class SystemParts:
     budget: Budget = field(default_factory=Budget)
     record: IterateRecording = field(default_factory=IterateRecording)
     start: SystemStart = field(default_factory=SystemStart)
+
+
+class Recorded(FormulaProblem):
+    """A problem that keeps the points where its residual is asked for."""
+
+    def __init__(self, system: Published) -> None:
+        super().__init__(system.formula, len(system.start()), columns=True)
+        self.points: list[Array] = []
+
+    def residual(self, u: Array) -> Array:
+        self.points.append(np.array(u))
+        return super().residual(u)

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 import scipy.optimize
-from cases import run
+from cases import Recorded, run
 from nlsolve_solvers.external import ScipyRoot
 from nlsolve_systems import Published
 from nlsolve_systems.catalogue import PROBLEMS
@@ -28,18 +28,6 @@ ITERATIVE: dict[str, dict[str, Any]] = {
     "df-sane": {"fatol": GOAL, "ftol": 0.0, "fnorm": np.linalg.norm, "maxfev": 50},
 }
 OPTIONS = {"hybr": {"xtol": 1e-8, "maxfev": 0}, **ITERATIVE}
-
-
-class Recorded(FormulaProblem):
-    """A problem that keeps the points where its residual is asked for."""
-
-    def __init__(self, system: Published) -> None:
-        super().__init__(system.formula, len(system.start()), columns=True)
-        self.points: list[Array] = []
-
-    def residual(self, u: Array) -> Array:
-        self.points.append(np.array(u))
-        return super().residual(u)
 
 
 def called(problem: Recorded, start: Array, method: str) -> Any:

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from cases import run
+from cases import Recorded, run
 from nlsolve_linear.lapack import Lapack
 from nlsolve_solvers.external import PetscSnes, petsc_snes
 from nlsolve_solvers.external.petsc import PETSc
@@ -15,7 +15,6 @@ from nlsolve_solvers.external.served import Served
 from nlsolve_systems import Published
 from nlsolve_systems.catalogue import PROBLEMS
 
-from nlsolve.algebra.formula import FormulaProblem
 from nlsolve.series import Array
 from nlsolve.solving.stopping import StoppingTest
 
@@ -30,18 +29,6 @@ SEARCHES: dict[str, dict[str, Any]] = {
     "basic": {"snes_linesearch_type": "basic"},
     "bt": {"snes_linesearch_type": "bt", "snes_linesearch_order": 3},
 }
-
-
-class Recorded(FormulaProblem):
-    """A problem that keeps the points where its residual is asked for."""
-
-    def __init__(self, system: Published) -> None:
-        super().__init__(system.formula, len(system.start()), columns=True)
-        self.points: list[Array] = []
-
-    def residual(self, u: Array) -> Array:
-        self.points.append(np.array(u))
-        return super().residual(u)
 
 
 def called(problem: Recorded, start: Array, search: str, goal: float) -> Any:
