@@ -262,6 +262,10 @@ RUNS = _by_name(
         "‖div S + f − ρ dV/dt‖/‖∇S‖ by operators other than those solved with, where no pressure acts",
     ),
     Column(
+        "audit.moment",
+        "largest moment of the stresses on discs that is out of balance, over what |S| would have there",
+    ),
+    Column(
         "audit.resolution",
         "share of the change of V between neighbouring inner nodes that its gradients do not explain",
     ),
