@@ -14,11 +14,9 @@ from __future__ import annotations
 
 import statistics
 import sys
-import time
 from typing import Any
 
 import nlsolve
-from nlsolve.solving import ledger
 
 INCREMENTS = 6
 SCENES: dict[str, dict[str, Any]] = {
@@ -120,13 +118,6 @@ def compare(name: str, scene: dict[str, Any], rounds: int) -> None:
             print(flush=True)
 
 
-class ProcessorTime:
-    """A clock for the ledger that stands still while other programs run."""
-
-    perf_counter = staticmethod(time.process_time)
-
-
 if __name__ == "__main__":
-    ledger.time = ProcessorTime
     for title, document in SCENES.items():
         compare(title, document, int(sys.argv[1]) if len(sys.argv) > 1 else 5)

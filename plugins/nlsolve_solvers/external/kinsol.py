@@ -36,7 +36,9 @@ class Kinsol(NonlinearSolver):
     The refresh rule, which is told the contraction per solve with K*, decides whether K* is then factorised anew.
     KINSOL does not take a linear solver of ours, but takes a preconditioner: linear = "direct" is one step of its
     flexible GMRES on K* itself, of which K*⁻¹ is the exact preconditioner; "gmres" works on J(u), to the tolerance of
-    Eisenstat & Walker (1996), choice 2.
+    Eisenstat & Walker (1996), choice 2. As with any iterative solver, newton and line-search also ask for K* after a
+    step with |Δu_i| > 1.5 (1 + |u_i|) for some i, and do not watch how ‖R‖ falls, as with its dense solver. So a
+    direct call with that takes other steps for `setup_interval` > 1; for 1 it takes the same.
 
     One run is one step: until ‖R‖₂ ≤ `tolerance` · scale and a tenth of its first value, or until `iterations` are used
     up. KINSOL tests the largest entry of R alone, so it is handed R = 0 from there on.

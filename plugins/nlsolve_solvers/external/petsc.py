@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import gc
 import warnings
 from collections.abc import Callable, Iterator, Mapping
 from typing import Any
@@ -69,7 +70,7 @@ class Snes:
             self._snes.setTRTolerances(delta_0=self._radius * (float(np.linalg.norm(start)) or 1.0))
         before = _log()
         try:
-            with _logged():
+            with _logged(), _no_collection():
                 self._snes.solve(None, self._u)
         except Exception:  # PETSc's own error, or its wrapping of what a callback of ours raised, which is raised below
             if served.error is None:
@@ -111,6 +112,20 @@ def _logged() -> Iterator[None]:
         raise
     finally:
         stage.pop()
+
+
+@contextlib.contextmanager
+def _no_collection() -> Iterator[None]:
+    """No garbage is collected: an exception of a callback is pending all the way through PETSc, and a collection on
+    that way would print it as one that nobody caught.
+    """
+    collects = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if collects:
+            gc.enable()
 
 
 def _log() -> dict[str, float]:
