@@ -344,6 +344,23 @@ def test_every_known_letter_is_typeset(tmp_path, engine):
         assert as_letters(letter, engine) in shown, letter
 
 
+IN_PAIRS = {"rows": ["problem", "strategy"], "value": "seconds", "caption": "Seconds"}
+
+
+def test_a_space_parts_groups_of_rows_and_no_single_rows():
+    tex = build(spec(**IN_PAIRS), wide(2)).latex()
+    assert tex.count(r"\addlinespace") == 3
+    every_other = wide(2).sort_values("strategy", kind="stable")
+    assert r"\addlinespace" not in build(spec(**IN_PAIRS), every_other).latex()
+
+
+def test_spaces_between_groups_of_rows_count_as_height(tmp_path):
+    """Groups of two rows, which without their spaces would be a page high."""
+    needs("pdflatex")
+    tex = build(spec(**IN_PAIRS), wide(2, rows=20)).latex()
+    assert typeset(tmp_path, {"t": tex}, "pdflatex").exists()
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("engine", ENGINES)
 def test_what_is_too_wide_and_too_high_fits(tmp_path, engine):

@@ -6,11 +6,10 @@ Columns of numbers are those of siunitx, lines those of booktabs; ``\resizebox``
 from __future__ import annotations
 
 import math
-from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import groupby
+from itertools import accumulate, groupby, pairwise
 
 from nlsolve.show.tables.latex.fit import AVAILABLE, NumberFormat, Plan, Setting, plan_of, words_of
 from nlsolve.show.tables.latex.grid import Grid, GridColumn
@@ -29,6 +28,9 @@ PREAMBLE = "\n".join(
     )
 )
 """What the tables need, in a file beside them."""
+
+GAP = 0.5
+"""Height of the space between groups of rows, in lines."""
 
 LETTER = {"left": "l", "center": "c", "right": "r", "number": "l"}
 
@@ -74,6 +76,15 @@ class _Tabular:
         return [max(len(words_of(column.cells[row]).lines(limit)) for column in self.columns) or 1 for row in self.rows]
 
     @cached_property
+    def begins(self) -> set[int]:
+        """The rows above which a space parts groups: where the first label changes, and has several rows."""
+        if len(self.grid.labels) < 2:
+            return set()
+        ends = accumulate(len(list(rows)) for _, rows in groupby(self.grid.labels[0].cells))
+        groups = list(pairwise((0, *ends)))
+        return {start for before, (start, end) in pairwise(groups) if max(end - start, before[1] - before[0]) > 1}
+
+    @cached_property
     def heads(self) -> list[list[str]]:
         """The lines of the last heading of each column."""
         return [column.heads[-1].lines(self.setting.heading_limit(column)) for column in self.columns]
@@ -82,7 +93,8 @@ class _Tabular:
         """Height of these rows with headings and rules [pt]; headings above several columns may have two lines."""
         above = 2 * (len(self.columns[-1].heads) - 1 + bool(self.grid.above.tex))
         last = max(map(len, self.heads))
-        return self.setting.size.line * (above + last + sum(self.lines[row] for row in rows) + 2)
+        gaps = GAP * sum(row in self.begins for row in rows[1:])
+        return self.setting.size.line * (above + last + sum(self.lines[row] for row in rows) + gaps + 2)
 
     def cell(self, column: GridColumn, row: int) -> str:
         """A cell of a row; numbers that stand by their points are left to siunitx."""
@@ -148,15 +160,13 @@ class _Tabular:
     def _body(self, rows: range) -> Iterator[str]:
         """The rows. What the one above has said of several columns of labels is not said again."""
         labels = self.grid.labels
-        many = Counter(labels[0].cells) if len(labels) > 1 else Counter[str]()
         for row in rows:
             cells = [self.cell(column, row) for column in self.columns]
             for level in range(len(labels) - 1) if row > rows[0] else ():
                 if any(each.cells[row] != each.cells[row - 1] for each in labels[: level + 1]):
                     break
                 cells[level] = ""
-            begins = row > rows[0] and bool(cells[0])
-            if begins and max(many[labels[0].cells[k]] for k in (row - 1, row)) > 1:
+            if row > rows[0] and row in self.begins:
                 yield r"\addlinespace"
             yield " & ".join(cells) + r" \\"
 
