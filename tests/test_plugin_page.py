@@ -12,7 +12,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-from nlsolve.cli.plugins.check import PAGE as NAMED
+from nlsolve.cli.plugins.checking import PAGE as NAMED
 from nlsolve.cli.plugins.scaffold import CONTRACTS, files_of
 from nlsolve.contracts.component import Component
 from nlsolve.contracts.scene import Scene

@@ -182,9 +182,12 @@ def _followed(process: subprocess.Popen[bytes], report: int, output: int) -> tup
                 if not data:
                     break
                 lines, printed, deadline = lines + data, 0, _now() + IMPORT_SECONDS
-    code = process.wait()
-    how = signal.Signals(-code).name if code < 0 else f"exit code {code}"
-    return _told(lines), f"it ends the interpreter with {how}" if lines else ""
+    return _told(lines), f"it ends the interpreter with {how_it_ended(process.wait())}" if lines else ""
+
+
+def how_it_ended(code: int) -> str:
+    """How a process ended: "exit code 3", or the name of the signal, whose number a code has below zero."""
+    return signal.Signals(-code).name if code < 0 else f"exit code {code}"
 
 
 def _told(lines: bytes) -> list[str]:

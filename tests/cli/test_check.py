@@ -9,6 +9,7 @@ import pytest
 from typer.testing import CliRunner
 
 from nlsolve.cli.app import app
+from nlsolve.cli.plugins import apart
 
 LAW = """\
 from typing import Any, Literal
@@ -99,3 +100,64 @@ def test_what_cannot_be_checked(words: list[str], sentence: str) -> None:
     code, table, said = told(*words)
     assert (code, table) == (2, "")
     assert said.startswith(sentence)
+
+
+ENDS = {
+    "derivative": ("os._exit(3)", "ended the interpreter with exit code 3"),
+    "shape": ("ctypes.string_at(0)", "ended the interpreter with SIGSEGV"),
+    "series": ("os.kill(os.getpid(), signal.SIGSTOP)", "could not be stopped"),
+}
+"""Name of a check -> what a law does in it, and what is said."""
+
+
+@pytest.mark.parametrize("name", ENDS)
+def test_a_law_that_ends_its_process(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str) -> None:
+    """The checks before that stand, the law behind it in the file is checked, and what it prints is no table."""
+    what, sentence = ENDS[name]
+    monkeypatch.setattr(apart, "SECONDS", 2.0)
+    monkeypatch.setattr(apart, "GRACE", 1.0)
+    asked = f'import ctypes, os, signal\nif running() == "{name}":\n    {what}\nprint("a word")\nreturn '
+    body = "".join(f"        {line}\n" for line in asked.splitlines())
+    text = LAW.replace("        return ", body.rstrip() + " ").replace(
+        "class Honey", "from nlsolve.testing.kit import verdicts\n\n\ndef running():\n"
+        "    return verdicts._REPORT.get().running[-1]\n\n\nclass Honey"
+    )  # fmt: skip
+    last = LAW.partition("class")[2].replace("Honey", "Water").replace("honey", "water")
+    path = tmp_path / "laws.py"
+    path.write_text(f"{text}\n\nclass{last}", encoding="utf-8")
+    code, document, said = told(str(path), "--json")
+    assert code == 1
+    first, second = json.loads(document)
+    assert (first["kind"], second["kind"], second["holds"]) == ("honey-of-a-file", "water-of-a-file", True)
+    failed = {verdict["name"]: verdict["failure"] for verdict in first["verdicts"] if verdict["failure"]}
+    assert all(verdict["reached"] for verdict in first["verdicts"])
+    assert failed == {name: f'the check "{name}" {sentence}'}
+    assert said.startswith(f"law honey-of-a-file: does not keep its contract: {name}; see")
+
+
+def test_a_file_that_ends_the_process_as_it_is_imported(tmp_path: Path) -> None:
+    path = tmp_path / "plugin.py"
+    path.write_text("import os\nos._exit(0)\n", encoding="utf-8")
+    code, document, said = told(str(path), "--json")
+    assert code == 1
+    (found,) = json.loads(document)
+    assert found["verdicts"][0]["failure"] == 'the check "registered" ended the interpreter with exit code 0'
+    assert said.startswith("file plugin.py: does not keep its contract: registered; see")
+
+
+@pytest.mark.parametrize(
+    ("what", "sentence"),
+    [
+        ("__import__('os')._exit(3)", 'the check "made" ended the interpreter with exit code 3'),
+        ("raise TypeError('no')", "raised TypeError: no"),
+    ],
+)
+def test_a_component_that_cannot_be_made(tmp_path: Path, what: str, sentence: str) -> None:
+    path = tmp_path / "plugin.py"
+    made = f"    def model_post_init(self, context: Any) -> None:\n        {what}\n\n"
+    path.write_text(LAW.replace("    def viscosity", f"{made}    def viscosity"), encoding="utf-8")
+    code, document, said = told(str(path), "--json")
+    assert code == 1
+    (found,) = json.loads(document)
+    assert [verdict["failure"] for verdict in found["verdicts"]] == [sentence]
+    assert said.startswith("law honey-of-a-file: does not keep its contract: made; see")

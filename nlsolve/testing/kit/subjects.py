@@ -25,7 +25,7 @@ from nlsolve.contracts.status import SolveError, Status
 from nlsolve.flow.scene import FlowScene
 from nlsolve.testing.discretizers import check_discretizer
 from nlsolve.testing.kit.toys import ToyLaw, toy_cloud, toy_flow
-from nlsolve.testing.kit.verdicts import Verdict, promise, verdicts
+from nlsolve.testing.kit.verdicts import Told, Verdict, promise, verdicts
 from nlsolve.testing.laws import check_law
 from nlsolve.testing.linear_solvers import check_linear_solver
 from nlsolve.testing.problems import check_problem
@@ -97,7 +97,7 @@ def contract_of(cls: type[Component]) -> type[Component]:
     raise TypeError(f"{cls.__name__} is of no contract: {', '.join(contract.__name__ for contract in CHECKS)}")
 
 
-def verdicts_of(component: Component) -> tuple[Verdict, ...]:
+def verdicts_of(component: Component, told: Told | None = None) -> tuple[Verdict, ...]:
     """What is found of each promise of the component's contract, in order."""
     check = CHECKS[contract_of(type(component))]
-    return verdicts(lambda: check(component))
+    return verdicts(lambda: check(component), told=told)

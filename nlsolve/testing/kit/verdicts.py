@@ -28,6 +28,9 @@ SECONDS = 50.0
 
 HERE = str(Path(__file__).parents[1])
 
+WHOLE = "check"
+"""The name of the promise that the checks can be carried out at all."""
+
 
 @dataclass(frozen=True)
 class Verdict:
@@ -56,11 +59,36 @@ class _Promise:
     failure: str = ""
 
 
+Told = Callable[[str, tuple[Verdict, ...]], None]
+"""Is told the promise that is being checked whenever that changes, and what has been found so far."""
+
+
 @dataclass
 class _Report:
     deadline: float
     homes: tuple[str, ...] = (HERE,)
     promises: dict[str, _Promise] = field(default_factory=dict)
+    running: list[str] = field(default_factory=list)
+    told: Told = lambda name, found: None
+
+    @contextmanager
+    def during(self, name: str) -> Iterator[None]:
+        """Within, the promise of this name is being checked."""
+        self.running.append(name)
+        self.told(name, self.verdicts())
+        try:
+            yield
+        finally:
+            self.running.pop()
+            if self.running:
+                self.told(self.running[-1], self.verdicts())
+
+    def verdicts(self) -> tuple[Verdict, ...]:
+        """What has been found of each promise."""
+        return tuple(
+            Verdict(name, found.meaning, found.failure, bool(found.kept or found.failure))
+            for name, found in self.promises.items()
+        )
 
 
 _REPORT: ContextVar[_Report | None] = ContextVar("report", default=None)
@@ -76,7 +104,7 @@ def promise(name: str, meaning: str) -> Iterator[None]:
     found = report.promises.setdefault(name, _Promise(meaning))
     failure = ""
     try:
-        with _until(report.deadline):
+        with report.during(name), _until(report.deadline):
             yield
     except CaseStopped as stopped:
         failure = stopped.detail
@@ -90,22 +118,20 @@ def promise(name: str, meaning: str) -> Iterator[None]:
     found.failure = found.failure or failure
 
 
-def verdicts(check: Callable[[], None], seconds: float = SECONDS) -> tuple[Verdict, ...]:
+def verdicts(check: Callable[[], None], seconds: float = SECONDS, told: Told | None = None) -> tuple[Verdict, ...]:
     """What a check finds of each promise, in order. What it raises besides is the failure of the promise "check"."""
     report = _Report(time.monotonic() + seconds, (HERE, check.__code__.co_filename))
+    report.told = told or report.told
     token = _REPORT.set(report)
     try:
-        with promise("check", "the checks can be carried out"), np.errstate(all="ignore"):
+        with promise(WHOLE, "the checks can be carried out"), np.errstate(all="ignore"):
             check()
     finally:
         _REPORT.reset(token)
-    whole = report.promises.pop("check")
+    whole = report.promises.pop(WHOLE)
     if whole.failure:
-        report.promises["check"] = whole
-    return tuple(
-        Verdict(name, found.meaning, found.failure, bool(found.kept or found.failure))
-        for name, found in report.promises.items()
-    )
+        report.promises[WHOLE] = whole
+    return report.verdicts()
 
 
 def _place(error: BaseException) -> str:

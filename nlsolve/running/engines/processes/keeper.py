@@ -9,6 +9,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 
 from nlsolve.contracts.status import InputError, Status
+from nlsolve.registry.probing import how_it_ended
 from nlsolve.results.frames import Part
 from nlsolve.running.engines.execution import part_without_record
 from nlsolve.running.engines.places import frames_of_dump, place
@@ -148,7 +149,7 @@ class Keeper:
         self.drop()
         if -code in KILLED and not last:
             return None
-        how = signal.Signals(-code).name if code < 0 else f"exit code {code}"
+        how = how_it_ended(code)
         detail = f"the interpreter ended with {how}{where}"
         part = part_without_record(task.case, task.parameters, Status.CRASHED, detail, how)
         return replace(part, output=output)
