@@ -169,7 +169,7 @@ def test_public_names_are_there(door):
 )
 def test_the_door_and_the_version_load_no_heavy_library(statement):
     """In a process of its own: what is loaded is looked at, not how long that takes."""
-    heavy = ("matplotlib", "pyarrow", "pandas", "jinja2", "scipy", "typer")
+    heavy = ("matplotlib", "pyarrow", "pandas", "jinja2", "scipy", "typer", "numba")
     code = f"{statement}\nimport sys\nprint([name for name in {heavy!r} if name in sys.modules])"
     told = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
     assert told.splitlines()[-1] == "[]"

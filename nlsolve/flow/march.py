@@ -94,6 +94,7 @@ class FlowSimulation(Simulation):
         """Take `cloud` as that of t = 0, and find the node of the probe."""
         self.initial = cloud
         self.sizes = {
+            "compiled_by": self.state.discretizer.compiled_by(),
             "nodes": len(cloud.nodes),
             "unknowns": 2 * len(cloud.interior),
             "smallest_spacing": float(cloud.nearest_distance.min()),

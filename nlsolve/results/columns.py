@@ -161,6 +161,7 @@ RUNS = _by_name(
         "s",
         timed=True,
     ),
+    Column("compiled_by", "what compiled the weights of the operators; empty where numpy computes them"),
     Column("linear_chosen", "linear solver that factorised the last tangent, where `auto` chose it"),
     Column("ordering", "column ordering the linear solver used"),
     Column("fill", "entries stored in the last factors", symbol="entries of the factors"),

@@ -12,6 +12,8 @@ from pydantic import Field
 
 from nlsolve.plugin import Cloud, Discretizer, Operators, PointOperators, SolveError
 from nlsolve_discretizers.conservation import conserving
+from nlsolve_discretizers.kernels import ranking
+from nlsolve_discretizers.kernels.machine_code import compiler_name
 from nlsolve_discretizers.weights.assembly import Gradient, sparse_rows
 from nlsolve_discretizers.weights.diagnostics import diagnosis
 from nlsolve_discretizers.weights.least_squares import Derivatives, monomials
@@ -47,6 +49,11 @@ class Collocation(Discretizer):
     """Quality of a support below which it is enlarged."""
     growths: ClassVar[int] = 3
     """How often a weak support is enlarged, by half each time, before it is refused."""
+
+    def compiled_by(self) -> str | None:
+        """numba, where it is installed, for the ranks of neighbours."""
+        ranking.machine_code()
+        return compiler_name()
 
     @abstractmethod
     def neighbour_count(self, role: str) -> int | None:

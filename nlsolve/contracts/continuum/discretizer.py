@@ -108,6 +108,10 @@ class Discretizer(Component, ABC):
         """This discretizer, with what it leaves open chosen for a law at strain rates of about `rate` [1/s]."""
         return self
 
+    def compiled_by(self) -> str | None:
+        """What compiled the code that builds the operators, e.g. "numba 0.68.1"; asking loads it."""
+        return None
+
     @abstractmethod
     def operators(self, cloud: Cloud, volumetric: bool) -> Operators:
         """B, S and, when `volumetric`, B_θ, S_θ. Raises SolveError (bad cloud) naming the place where supports fail."""

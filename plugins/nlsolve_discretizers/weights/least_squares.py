@@ -15,6 +15,8 @@ from math import factorial
 
 import numpy as np
 
+from nlsolve_discretizers.kernels.normal_equations import fitted
+
 Derivatives = tuple[tuple[int, int], ...]
 
 SOUND = 0.05  # smallest pivot, relative to its column, with which the normal equations keep 13 digits
@@ -46,59 +48,12 @@ def fit(
     x, y = offsets / radius
     distance = np.sqrt(x * x + y * y)
     w = np.where(distance < 1.0, weight_function(weight, distance, shape), 0.0)
-    phi, smallest = _by_normal_equations(x, y, w, degree, derivatives)
+    phi, smallest = fitted(x, y, w, degree, derivatives)
     poor = np.flatnonzero(~(smallest >= SOUND))
     if len(poor):
         phi[..., poor], smallest[poor] = _by_orthogonal_columns(x[:, poor], y[:, poor], w[:, poor], degree, derivatives)
     order = np.array([i + j for i, j in derivatives])
     return (phi / radius ** order[:, None, None]).transpose(0, 2, 1), smallest
-
-
-def _by_normal_equations(
-    x: np.ndarray, y: np.ndarray, w: np.ndarray, degree: int, derivatives: Derivatives
-) -> tuple[np.ndarray, np.ndarray]:
-    """φ (D, k, T) in the scaled coordinates and the smallest pivot (T,), by elimination in Pᵀ w P z = L(p), φ = w P z.
-
-    The entries of Pᵀ w P are the moments Σ_k w x^i y^j up to twice the degree; its pivots are those of R squared.
-    """
-    exponents, high = monomials(degree), monomials(2 * degree)
-    place = {exponent: number for number, exponent in enumerate(high)}
-    weighed = np.empty((len(high), *x.shape))
-    weighed[0] = w
-    for number, (i, j) in enumerate(high[1:], start=1):
-        lower, factor = ((i - 1, j), x) if i else ((i, j - 1), y)
-        np.multiply(weighed[place[lower]], factor, out=weighed[number])
-    moments = weighed.sum(axis=1)
-    count = len(exponents)
-    system = np.zeros((count, count + len(derivatives), x.shape[1]))
-    system[:, :count] = moments[[[place[i + p, j + q] for p, q in exponents] for i, j in exponents]]
-    for d, (i, j) in enumerate(derivatives, start=count):
-        system[place[i, j], d] = factorial(i) * factorial(j)
-    size = np.maximum(system[range(count), range(count)], np.finfo(float).tiny)
-    pivots = _eliminate(system)
-    z = system[:, count:]
-    phi = np.einsum("cdt,ckt->dkt", z, weighed[:count])
-    return phi, np.sqrt((pivots / size).min(axis=0))
-
-
-def _eliminate(system: np.ndarray) -> np.ndarray:
-    """Solve A z = b for all T targets, in place: `system` (c, c + D, T) holds A, symmetric and semi-definite, of which
-    the upper triangle is used, and D columns b, which become z. Returns the pivots (c, T); z means nothing where one
-    vanishes.
-    """
-    count = len(system)
-    pivots = np.empty((count, system.shape[2]))
-    for c in range(count):
-        pivots[c] = np.maximum(system[c, c], 0.0)
-        inverse = 1.0 / np.where(pivots[c] > 0.0, pivots[c], 1.0)
-        for r in range(c + 1, count):
-            system[r, r:] -= (system[c, r] * inverse) * system[c, r:]
-        system[c, c] = inverse
-    for c in reversed(range(count)):
-        system[c, count:] *= system[c, c]
-        for r in range(c):
-            system[r, count:] -= system[r, c] * system[c, count:]
-    return pivots
 
 
 def _by_orthogonal_columns(

@@ -12,6 +12,8 @@ from functools import cached_property
 import numpy as np
 import scipy
 
+from nlsolve_discretizers.kernels.ranking import ranked
+
 SPARE = 8
 """Sources that are listed beyond those needed, where a motion is to follow."""
 
@@ -63,11 +65,7 @@ class Lists:
             new = sources[sources_before < 0]
             if len(new):
                 reach = np.minimum(reach, scipy.spatial.cKDTree(new).query(targets)[0])
-        (x, y), (u, v) = np.ascontiguousarray(sources.T), targets.T[..., None]
-        squared = (x[index] - u) ** 2 + (y[index] - v) ** 2
-        squared[index < 0] = np.inf
-        order, row = np.argsort(squared, axis=1), np.arange(len(targets))[:, None]
-        index, distance = index[row, order], np.sqrt(squared[row, order])
+        index, distance = ranked(sources, targets, index)
         now = Lists(sources, targets, index, distance, reach, self.count)
         return now._listed_anew(np.flatnonzero(~(distance[:, self.count - 1] < reach)))
 

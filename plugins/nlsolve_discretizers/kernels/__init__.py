@@ -1,0 +1,1 @@
+"""Formulas for many targets that numba compiles where it is installed: extra nlsolve[numba]. Else numpy runs them."""
