@@ -14,12 +14,13 @@ from nlsolve.plugin import Cloud, Discretizer, Operators, PointOperators, SolveE
 from nlsolve_discretizers.conservation import conserving
 from nlsolve_discretizers.kernels import ranking
 from nlsolve_discretizers.kernels.machine_code import compiler_name
+from nlsolve_discretizers.kernels.offsets import offsets
 from nlsolve_discretizers.weights.assembly import Gradient, sparse_rows
 from nlsolve_discretizers.weights.diagnostics import diagnosis
 from nlsolve_discretizers.weights.least_squares import Derivatives, monomials
 from nlsolve_discretizers.weights.lists import Lists
 from nlsolve_discretizers.weights.neighbours import Neighbours
-from nlsolve_discretizers.weights.supports import Supports, offsets
+from nlsolve_discretizers.weights.supports import Supports
 from nlsolve_discretizers.weights.triangles import Triangles
 
 AT_ONCE = 1024  # targets whose local systems are in the cache together
@@ -218,11 +219,16 @@ class Collocation(Discretizer):
         return Gradient(supports.index, dx, dy)
 
 
-def _batches(counts: np.ndarray, targets: np.ndarray) -> Iterator[tuple[int, np.ndarray]]:
-    """Number of neighbours, and at most AT_ONCE of the `targets` (indices) that have so many, batch by batch."""
+def _batches(counts: np.ndarray, targets: np.ndarray) -> Iterator[tuple[int, np.ndarray | slice]]:
+    """Number of neighbours, and at most AT_ONCE of the `targets` (indices) that have so many, batch by batch; a slice
+    where they follow one another, so that nothing is copied.
+    """
     for count in np.unique(counts[targets]):
         alike = targets[counts[targets] == count]
-        yield from ((int(count), alike[begin : begin + AT_ONCE]) for begin in range(0, len(alike), AT_ONCE))
+        for begin in range(0, len(alike), AT_ONCE):
+            which = alike[begin : begin + AT_ONCE]
+            first, last = int(which[0]), int(which[-1])
+            yield int(count), slice(first, last + 1) if last - first == len(which) - 1 else which
 
 
 def least_count(degree: int) -> int:

@@ -127,16 +127,17 @@ def eliminated(system: np.ndarray) -> np.ndarray:
 def in_blocks(
     x: np.ndarray, y: np.ndarray, w: np.ndarray, degree: int, derivatives: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """`together`, AT_ONCE targets after AT_ONCE targets."""
+    """`together`, AT_ONCE targets after AT_ONCE targets; φ of a target stays together."""
     near, targets = x.shape
-    phi, smallest = np.empty((len(derivatives), near, targets)), np.empty(targets)
+    phi, smallest = np.empty((len(derivatives), targets, near)), np.empty(targets)
     for begin in range(0, targets, AT_ONCE):
         end = min(begin + AT_ONCE, targets)
-        phi[:, :, begin:end], smallest[begin:end] = together(
+        part, smallest[begin:end] = together(
             np.ascontiguousarray(x[:, begin:end]),
             np.ascontiguousarray(y[:, begin:end]),
             np.ascontiguousarray(w[:, begin:end]),
             degree,
             derivatives,
         )
-    return phi, smallest
+        phi[:, begin:end] = part.transpose(0, 2, 1)
+    return phi.transpose(0, 2, 1), smallest

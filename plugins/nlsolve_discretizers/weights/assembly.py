@@ -62,6 +62,12 @@ def sparse_rows(blocks: list[tuple[np.ndarray, np.ndarray]], shape: tuple[int, i
     return matrix
 
 
+def rows_times(factors: np.ndarray, matrix: Any) -> Any:
+    """The CSR matrix with each of its rows times a factor, (rows,)."""
+    values = np.repeat(factors, np.diff(matrix.indptr)) * matrix.data
+    return sp.csr_array((values, matrix.indices, matrix.indptr), shape=matrix.shape)
+
+
 def _in_turn(one: np.ndarray, other: np.ndarray) -> np.ndarray:
     """The entries (T, k) of the one and the other by turns, (T, 2k)."""
     return np.stack([one, other], axis=2).reshape(len(one), -1)

@@ -11,6 +11,7 @@ import numpy as np
 import scipy
 
 from nlsolve.plugin import SolveError, Status
+from nlsolve_discretizers.kernels.offsets import offsets
 from nlsolve_discretizers.weights.lists import Lists
 
 REACH = 1.5  # times the distance of the farthest neighbour: a quadrant whose nearest source lies beyond is left empty
@@ -57,10 +58,7 @@ class Supports:
         plain = cls._of(distance, index, counts)
         if not balanced:
             return plain
-        quadrants = _quadrants(offsets(sources, targets, index[:, :largest]))
-        neighbour = np.arange(largest)[:, None] < counts
-        served = np.all([(inside & neighbour).any(axis=0) for inside in quadrants], axis=0)
-        lopsided = np.flatnonzero(~served)
+        lopsided = np.flatnonzero(~_surrounded(offsets(sources, targets, index[:, :largest]), counts))
         if not len(lopsided):
             return plain
         most = min(2 * largest, len(sources) - 1)
@@ -104,15 +102,19 @@ class Supports:
         return Supports(index, count, radius, farthest)
 
 
-def offsets(sources: np.ndarray, targets: np.ndarray, index: np.ndarray) -> np.ndarray:
-    """x_s − x_t, (2, k, T) [mm], for the sources `index` (T, k) of each target."""
-    return np.ascontiguousarray(sources.T)[:, index.T] - targets.T[:, None]
-
-
 def _quadrants(offsets: np.ndarray) -> list[np.ndarray]:
-    """Which of the offsets (2, k, T) lie in each closed quadrant, (k, T) each."""
-    x, y = offsets
-    return [(x >= 0) & (y >= 0), (x <= 0) & (y >= 0), (x <= 0) & (y <= 0), (x >= 0) & (y <= 0)]
+    """Which of the offsets (2, …) lie in each closed quadrant, (…) each."""
+    (right, above), (left, below) = offsets >= 0, offsets <= 0
+    return [right & above, left & above, left & below, right & below]
+
+
+def _surrounded(offsets: np.ndarray, counts: np.ndarray) -> np.ndarray:
+    """Whether the first counts[t] of the offsets (2, k, T) serve every quadrant, (T,)."""
+    served = np.zeros((4, offsets.shape[2]), dtype=bool)
+    for k in range(offsets.shape[1]):  # row by row, which stays in the cache
+        for quadrant, inside in enumerate(_quadrants(offsets[:, k])):
+            served[quadrant] |= inside & (k < counts)
+    return np.logical_and.reduce(served)
 
 
 def _balanced(offsets: np.ndarray, distance: np.ndarray, counts: np.ndarray) -> np.ndarray:

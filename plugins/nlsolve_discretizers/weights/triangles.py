@@ -18,6 +18,7 @@ import scipy.sparse as sp
 
 from nlsolve.plugin import Cloud, PointOperators, SolveError, Status, hat_gradients
 from nlsolve_discretizers.weights import delaunay
+from nlsolve_discretizers.weights.assembly import rows_times
 
 
 @dataclass(frozen=True)
@@ -170,7 +171,7 @@ class Triangles:
         # Patch area times mean divergence: the net flux out of each patch.
         net_flux = sp.csr_array((self.hat_gradients.ravel(), (rows.ravel(), columns.ravel())), shape=shape)
         patch_areas = np.bincount(patch, areas, count)
-        dilatation = (sp.diags_array(1.0 / patch_areas) @ net_flux).tocsr()
+        dilatation = rows_times(1.0 / patch_areas, net_flux)
         centres = np.stack([np.bincount(patch, areas * c, count) / patch_areas for c in self.centroids().T], axis=1)
         return Patches(self, dilatation, net_flux, patch_areas, centres)
 
@@ -197,8 +198,9 @@ class Patches:
         """S_θ = −W⁻¹ B_θᵀ A (2F, L) at the interior nodes, per area W of their material."""
         inside = self.triangles.cloud.interior
         free = np.stack([2 * inside, 2 * inside + 1], axis=1).ravel()
-        per_area = sp.diags_array(-1.0 / np.repeat(self.triangles.node_areas[inside], 2))
-        return PointOperators(self.dilatation, (per_area @ self.net_flux[:, free].T).tocsr(), self.centres, self.areas)
+        per_area = -1.0 / np.repeat(self.triangles.node_areas[inside], 2)
+        force = rows_times(per_area, self.net_flux.T.tocsr()[free])
+        return PointOperators(self.dilatation, force, self.centres, self.areas)
 
     def conservative(self) -> PointOperators:
         """S_θ = −B_θᵀ A (2F, L) at the interior nodes."""

@@ -15,7 +15,8 @@ from clouds import CLOUDS, jittered_points
 from nlsolve_discretizers import LinearTriangles, MovingLeastSquares, RadialBasis
 from nlsolve_discretizers.kernels import machine_code, normal_equations, ranking
 from nlsolve_discretizers.kernels.machine_code import compiled, compiler_name, numpy_alone
-from nlsolve_discretizers.weights.supports import Supports, offsets
+from nlsolve_discretizers.kernels.offsets import offsets
+from nlsolve_discretizers.weights.supports import Supports
 
 from nlsolve.plugin import Cloud, Discretizer
 

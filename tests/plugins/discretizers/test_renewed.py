@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 from clouds import CLOUDS, jittered_points
 from nlsolve_discretizers import LinearTriangles, MovingLeastSquares, RadialBasis
+from nlsolve_discretizers.kernels.offsets import offsets
 from nlsolve_discretizers.weights import delaunay, least_squares
 from nlsolve_discretizers.weights.least_squares import SOUND, fit
 from nlsolve_discretizers.weights.lists import Lists
-from nlsolve_discretizers.weights.supports import Supports, offsets
+from nlsolve_discretizers.weights.supports import Supports
 from nlsolve_discretizers.weights.triangles import Triangles
 
 from nlsolve.plugin import Cloud, Discretizer, Operators, SolveError
@@ -203,9 +204,9 @@ def asked(monkeypatch: pytest.MonkeyPatch) -> list[int]:
     numbers: list[int] = []
     query = Lists.query
 
-    def counted(lists: Lists, count: int, which: Array) -> tuple[Array, Array]:
+    def counted(lists: Lists, count: int, which: Array, quick: bool = False) -> tuple[Array, Array]:
         numbers.append(len(which))
-        return query(lists, count, which)
+        return query(lists, count, which, quick)
 
     monkeypatch.setattr(Lists, "query", counted)
     return numbers
