@@ -28,35 +28,46 @@ class Gradient:
 
     def strain(self, nodes: int) -> Any:
         """B (3T, 2 nodes): xx, yy, xy of ½(∇v + ᵗ∇v)."""
-        u, v = 2 * self.near, 2 * self.near + 1
-        blocks = [(u, self.dx), (v, self.dy), (_in_turn(u, v), _in_turn(0.5 * self.dy, 0.5 * self.dx))]
+        u, v = self._columns(2, 0), self._columns(2, 1)
+        blocks = [(u, self.dx), (v, self.dy), ([u, v], [0.5 * self.dy, 0.5 * self.dx])]
         return sparse_rows(blocks, (3 * len(self.near), 2 * nodes))
 
     def divergence(self, nodes: int) -> Any:
         """div v (T, 2 nodes)."""
-        block = _in_turn(2 * self.near, 2 * self.near + 1), _in_turn(self.dx, self.dy)
+        block = [self._columns(2, 0), self._columns(2, 1)], [self.dx, self.dy]
         return sparse_rows([block], (len(self.near), 2 * nodes))
 
     def divergence_of_stress(self, points: int) -> Any:
         """S (2T, 3 points): ∂xx/∂x + ∂xy/∂y and ∂xy/∂x + ∂yy/∂y, node-major."""
-        xx, yy, xy = self.near, self.near + points, self.near + 2 * points
-        columns, values = np.hstack([xx, xy, yy, xy]), np.hstack([self.dx, self.dy, self.dy, self.dx])
-        return _node_major(columns, values, 3 * points)
+        xx, yy, xy = (self._columns(1, component * points) for component in range(3))
+        block = [xx, xy, xy, yy], [self.dx, self.dy, self.dx, self.dy]
+        return sparse_rows([block], (2 * len(self.near), 3 * points), axis=1)
 
     def of_pressure(self, points: int) -> Any:
         """(2T, points): ∂p/∂x and ∂p/∂y, node-major."""
-        return _node_major(np.hstack([self.near, self.near]), np.hstack([self.dx, self.dy]), points)
+        block = [self._columns(1, 0)] * 2, [self.dx, self.dy]
+        return sparse_rows([block], (2 * len(self.near), points), axis=1)
+
+    def _columns(self, factor: int, first: int) -> np.ndarray:
+        return factor * self.near.astype(np.int32) + np.int32(first)
 
 
-def sparse_rows(blocks: list[tuple[np.ndarray, np.ndarray]], shape: tuple[int, int]) -> Any:
-    """CSR matrix of stacked blocks of rows, each its columns and its values, (T, k) both.
+def sparse_rows(blocks: list[tuple[Any, Any]], shape: tuple[int, int], axis: int = 2) -> Any:
+    """CSR matrix of stacked blocks of as many rows each, given by their columns and their values, (T, k) both.
 
-    The zeros that fill up smaller supports are not stored.
+    Blocks may have lists of both, whose entries take turns, or follow each other at each target (`axis` = 1). The zeros
+    that fill up smaller supports are not stored.
     """
-    lengths = np.concatenate([np.full(len(columns), columns.shape[1]) for columns, _ in blocks])
-    columns = np.concatenate([columns.ravel() for columns, _ in blocks], dtype=np.int32)
-    values = np.concatenate([values.ravel() for _, values in blocks])
-    starts = np.concatenate([[0], np.cumsum(lengths)], dtype=np.int32)
+    parts = [tuple(part if isinstance(part, list) else [part] for part in block) for block in blocks]
+    ends = np.cumsum([0] + [len(values) * values[0].size for _, values in parts])
+    columns, values = np.empty(ends[-1], np.int32), np.empty(ends[-1])
+    for begin, end, (its_columns, its_values) in zip(ends, ends[1:], parts, strict=False):
+        form = np.insert(its_values[0].shape, axis, len(its_values))
+        np.stack(its_columns, axis, out=columns[begin:end].reshape(form), casting="same_kind")
+        np.stack(its_values, axis, out=values[begin:end].reshape(form))
+    rows = shape[0] // len(blocks)
+    starts = np.zeros(shape[0] + 1, np.int32)
+    np.cumsum(np.repeat(np.diff(ends) // rows, rows), out=starts[1:])
     matrix = sp.csr_array((values, columns, starts), shape=shape)
     matrix.eliminate_zeros()
     return matrix
@@ -66,14 +77,3 @@ def rows_times(factors: np.ndarray, matrix: Any) -> Any:
     """The CSR matrix with each of its rows times a factor, (rows,)."""
     values = np.repeat(factors, np.diff(matrix.indptr)) * matrix.data
     return sp.csr_array((values, matrix.indices, matrix.indptr), shape=matrix.shape)
-
-
-def _in_turn(one: np.ndarray, other: np.ndarray) -> np.ndarray:
-    """The entries (T, k) of the one and the other by turns, (T, 2k)."""
-    return np.stack([one, other], axis=2).reshape(len(one), -1)
-
-
-def _node_major(columns: np.ndarray, values: np.ndarray, sources: int) -> Any:
-    """Two rows of each of T nodes, side by side in `columns` and `values` (T, 2k), as rows 2 t and 2 t + 1."""
-    rows = 2 * len(columns), columns.shape[1] // 2
-    return sparse_rows([(columns.reshape(rows), values.reshape(rows))], (rows[0], sources))
