@@ -6,7 +6,7 @@ needed therefore hold the nearest ones until the motion has used up the rest (Ve
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -16,6 +16,9 @@ from nlsolve_discretizers.kernels.ranking import ranked
 
 SPARE = 8
 """Sources that are listed beyond those needed, where a motion is to follow."""
+
+FEW = 60_000
+"""Distances that are compared in less time than it takes to make a tree."""
 
 TIE = 1e-12
 """Two sources are equally near whose distances differ by less, relatively: the tree decides which is the last one."""
@@ -41,9 +44,10 @@ class Lists:
     @classmethod
     def of(cls, sources: np.ndarray, targets: np.ndarray, count: int, spare: int = 0) -> Lists:
         """The `count` nearest sources, and some to spare."""
-        none = np.zeros((len(targets), min(count + spare, len(sources))))
-        nothing = cls(sources, targets, none.astype(np.intp), none, none[:, 0], min(count, len(sources)))
-        return nothing._listed_anew(np.arange(len(targets)))
+        every, listed = np.arange(len(targets)), min(count + spare, len(sources))
+        index, distance = np.empty((len(targets), listed), np.intp), np.empty((len(targets), listed))
+        lists = cls(sources, targets, index, distance, np.empty(len(targets)), min(count, len(sources)))
+        return lists._filled(every, lists.query(listed, every))
 
     def moved(
         self,
@@ -56,28 +60,39 @@ class Lists:
 
         sources_before, targets_before : the number that each of them had, −1 for new ones; None: the same as now.
         """
-        index, reach = self.index, self.reach - _steps(self.sources, sources, sources_before).max(initial=0.0)
+        reach = self.reach - _steps(self.sources, sources, sources_before).max(initial=0.0)
         if targets_before is not None:
-            index, reach = index[targets_before], np.where(targets_before < 0, -np.inf, reach[targets_before])
-        reach = reach - _steps(self.targets, targets, targets_before)
+            reach = np.where(targets_before < 0, -np.inf, reach[targets_before])
+        reach -= _steps(self.targets, targets, targets_before)
         if sources_before is not None:
-            index = _numbers_now(sources_before, len(self.sources))[index]
             new = sources[sources_before < 0]
             if len(new):
                 reach = np.minimum(reach, scipy.spatial.cKDTree(new).query(targets)[0])
-        index, distance = ranked(sources, targets, index)
+        rows, numbers = _as_they_are(len(targets), len(self.sources))
+        if targets_before is not None:
+            rows = targets_before
+        if sources_before is not None:
+            numbers = _numbers_now(sources_before, len(self.sources))
+        index, distance = ranked(sources, targets, self.index, rows, numbers)
         now = Lists(sources, targets, index, distance, reach, self.count)
-        return now._listed_anew(np.flatnonzero(~(distance[:, self.count - 1] < reach)))
-
-    def _listed_anew(self, which: np.ndarray) -> Lists:
-        """These lists, with those of the targets `which` from the tree."""
+        which = np.flatnonzero(~(distance[:, self.count - 1] < reach))
         if not len(which):
-            return self
-        listed = self.index.shape[1]
-        index, distance, reach = self.index.copy(), self.distance.copy(), self.reach.copy()
-        distance[which], index[which] = self.query(listed, which, quick=len(which) < len(index))
-        reach[which] = distance[which, -1] if listed < len(self.sources) else np.inf
-        return replace(self, index=index, distance=distance, reach=reach)
+            return now
+        ask = now._compared if len(which) * len(sources) <= FEW else now.query
+        return now._filled(which, ask(index.shape[1], which))
+
+    def _filled(self, which: np.ndarray, found: tuple[np.ndarray, np.ndarray]) -> Lists:
+        """These lists, still in nobody's hands, with those `found` for the targets `which` written into them."""
+        self.distance[which], self.index[which] = found
+        self.reach[which] = self.distance[which, -1] if self.index.shape[1] < len(self.sources) else np.inf
+        return self
+
+    def _compared(self, count: int, which: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """What `query` gives, by comparing all distances; equal ones may be in another order."""
+        (x, y), (u, v) = self.sources.T, self.targets[which].T[..., None]
+        near = np.argpartition((x - u) ** 2 + (y - v) ** 2, count - 1, axis=1)[:, :count]
+        index, distance = ranked(self.sources, self.targets[which], near, *_as_they_are(len(which), len(self.sources)))
+        return distance, index
 
     def nearest(self) -> tuple[np.ndarray, np.ndarray]:
         """Distances and numbers of the `count` nearest sources of all targets, (T, count) each."""
@@ -88,13 +103,9 @@ class Lists:
             distance[tied], index[tied] = self.query(self.count, tied)
         return distance, index
 
-    def query(self, count: int, which: np.ndarray, quick: bool = False) -> tuple[np.ndarray, np.ndarray]:
-        """Distances and numbers of the `count` nearest sources of the targets `which`, (W, count) each, by the tree.
-
-        quick : by one that is made in half the time for a few questions, and may order equal distances otherwise.
-        """
-        tree = scipy.spatial.cKDTree(self.sources, compact_nodes=False, balanced_tree=False) if quick else self.tree
-        distance, index = tree.query(self.targets[which], np.arange(1, count + 1))
+    def query(self, count: int, which: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Distances and numbers of the `count` nearest sources of the targets `which`, (W, count) each, by the tree."""
+        distance, index = self.tree.query(self.targets[which], np.arange(1, count + 1))
         return distance, index
 
     @cached_property
@@ -108,6 +119,11 @@ def _steps(before: np.ndarray, now: np.ndarray, numbers: np.ndarray | None) -> n
     if numbers is None:
         return np.linalg.norm(now - before, axis=1)
     return np.where(numbers < 0, 0.0, np.linalg.norm(now - before[numbers], axis=1))
+
+
+def _as_they_are(targets: int, sources: int) -> tuple[np.ndarray, np.ndarray]:
+    """The numbers of targets and of sources that have kept them, and −1 for number −1."""
+    return np.arange(targets), np.append(np.arange(sources), -1)
 
 
 def _numbers_now(numbers_before: np.ndarray, count_before: int) -> np.ndarray:

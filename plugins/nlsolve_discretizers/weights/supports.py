@@ -74,8 +74,11 @@ class Supports:
         # On a regular grid the two tie, and a source on the rim would weigh nothing: the rim lies just beyond it.
         radius = np.maximum(0.5 * (farthest + next_one), 1.001 * farthest)
         width = int(counts.max(initial=1))
+        index = index[:, :width]
+        if (counts == width).all():
+            return cls(np.sort(index, axis=1), counts, radius, farthest)
         beyond = (np.arange(width) >= counts[:, None]) * (int(index.max(initial=0)) + 1)
-        return cls(np.sort(index[:, :width] + beyond, axis=1) - beyond, counts, radius, farthest)
+        return cls(np.sort(index + beyond, axis=1) - beyond, counts, radius, farthest)
 
     @classmethod
     def within(cls, sources: np.ndarray, targets: np.ndarray, radius: float) -> Supports:
