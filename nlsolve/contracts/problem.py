@@ -101,6 +101,8 @@ class NonlinearProblem(ABC):
     """False when `operator` gives another matrix than `jacobian`."""
     is_gradient: bool = False
     """True when R is the gradient of a convex potential, so that R(u + t w)·w grows with t for every direction w."""
+    has_other_discretizations: bool = False
+    """True when `jacobian_by` can assemble J of the same equations for the same unknowns by another discretizer."""
     typical_sizes: Array | None = None
     """Sizes, (U,), at which the unknowns count as large: what is small beside them is zero. None: not known."""
 

@@ -48,7 +48,10 @@ class Flow(NonlinearProblem):
     inertia, convection, body_force : present when given; f at the interior nodes, shape (F, 2) [N/mm³].
     reference_rate : ε̄ [1/s] at which a Newtonian operator takes the viscosity when none is given.
     drift : ε̇ − B v and tr ε̇ − B_θ v [1/s] where strain rates are accumulated; absent: ε̇ = B v.
+    others : operators of the same cloud by other discretizers, where those that `jacobian_by` builds are kept.
     """
+
+    has_other_discretizations = True
 
     def __init__(
         self,
@@ -63,10 +66,12 @@ class Flow(NonlinearProblem):
         body_force: Array | None = None,
         reference_rate: float | None = None,
         drift: PointRates | None = None,
+        others: dict[Discretizer, Operators] | None = None,
     ) -> None:
         self.cloud, self.operators, self.law = cloud, operators, law
         self._terms = inertia, convection
         self._reference_rate = reference_rate
+        self._others = {} if others is None else others
         self.is_gradient = operators.is_conservative and convection is None
         self._free = node_major(cloud.interior)
         lifted = np.zeros(2 * len(cloud.nodes))
@@ -168,7 +173,11 @@ class Flow(NonlinearProblem):
 
         λ is that of the nearest volume point of this flow. Raises SolveError when the nodes carry no such operators.
         """
-        others = discretizer.operators(self.cloud, self._modulus is not None)
+        others = self._others.get(discretizer)
+        if others is None:
+            others = self._others[discretizer] = discretizer.operators(
+                self.cloud, self.operators.volumetric is not None
+            )
         modulus: float | Array = 0.0
         if self._modulus is not None and self.operators.volumetric is not None and others.volumetric is not None:
             tree = scipy.spatial.cKDTree(self.operators.volumetric.points)

@@ -55,6 +55,7 @@ class FlowState:
     velocity : of all nodes, solved last, shape (N, 2) [mm/s].
     guess : velocity of all nodes that the next solve begins with, shape (N, 2) [mm/s].
     drift : how far accumulated strain rates are from those of `velocity`; None as long as they are the same.
+    others : operators of these nodes by other discretizers, as far as methods have asked for them.
     flow, unknowns : the problem solved last, and its solution, shape (2F,). Before the first solve `flow` is None and
         `unknowns` is not set.
     """
@@ -70,6 +71,7 @@ class FlowState:
         self.cloud: Cloud
         self.operators: Operators
         self.drift: PointRates | None = None
+        self.others: dict[Discretizer, Operators] = {}
         self.flow: Flow | None = None
         self.unknowns: Array
 
@@ -131,6 +133,7 @@ class FlowState:
     def build_operators(self) -> None:
         """Build the operators of the present nodes; the pressure is interpolated to the new volume points."""
         before = self.operators if self.pressure is not None else None
+        self.others = {}
         with self.entry("operators"):
             if self.moving is None:
                 self.operators = self.discretizer.operators(self.cloud, self.volumetric)
@@ -176,6 +179,7 @@ class FlowState:
             None if body_force is None else load * body_force,
             self.scene.reference_rate,
             self.drift,
+            self.others,
         )
 
     def enriched(self, finer: Enriched, discretizer: Discretizer, velocity: Array) -> FlowState:
@@ -185,7 +189,7 @@ class FlowState:
         """
         assert self.flow is not None
         there = copy(self)
-        there.cloud, there.moving = finer.cloud, None
+        there.cloud, there.moving, there.others = finer.cloud, None, {}
         there.velocity = there.guess = finer.carry(velocity)
         there.operators = discretizer.operators(finer.cloud, self.volumetric)
         there.gradient = None if self.gradient is None else discretizer.gradient(finer.cloud)

@@ -72,6 +72,7 @@ class CountedProblem(NonlinearProblem):
         self._scales: dict[bytes, float] = {}
         self.measure: Measure | None = None
         self.is_gradient = problem.is_gradient
+        self.has_other_discretizations = problem.has_other_discretizations
 
     @property
     def has_series(self) -> bool:

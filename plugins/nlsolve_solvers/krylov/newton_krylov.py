@@ -1,18 +1,33 @@
-"""‖R(u) + J(u) w‖ ≤ η ‖R(u)‖,  u ← u + t w : inexact Newton by GMRES, with the kept K* as preconditioner."""
+"""‖R(u) + J(u) w‖ ≤ η ‖R(u)‖,  u ← u + t w : inexact Newton by GMRES, preconditioned with the kept K*."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from typing import ClassVar, Literal
+from typing import Any, ClassVar, Literal
 
 import numpy as np
-from pydantic import Field
+from pydantic import Field, TypeAdapter
 
-from nlsolve.plugin import Globalized, KeptTangent, NonlinearProblem, NonlinearSolver, Step, cached_jacobian, norm
+from nlsolve.plugin import (
+    AnyDiscretizer,
+    Discretizer,
+    Globalized,
+    KeptTangent,
+    NonlinearProblem,
+    NonlinearSolver,
+    SolveError,
+    Status,
+    Step,
+    cached_jacobian,
+    norm,
+)
 from nlsolve_solvers.krylov.forcing import next_forcing
 from nlsolve_solvers.krylov.gmres import gmres
 
 SMALLEST_FORCING = 1e-6  # below it lies what the next residual will correct anyway
+
+TRIANGLES: TypeAdapter[Discretizer] = TypeAdapter(AnyDiscretizer)
+"""Looks up the discretizer of linear triangles, `delaunay`, when a solve begins."""
 
 
 class NewtonKrylov(NonlinearSolver):
@@ -21,6 +36,9 @@ class NewtonKrylov(NonlinearSolver):
 
     J w comes from the assembled Jacobian, or without one from the residual's own series: [R(u + a w)]_1. The refresh
     rule is told the contraction per inner iteration, which is what K* decides.
+
+    J has the support of the case's discretizer, K* need not: with triangles it is the tangent of the same equations by
+    linear finite elements on the same nodes, which is spectrally near J and has about a sixth of its factors' entries.
     """
 
     kind: Literal["newton-krylov"] = "newton-krylov"
@@ -33,6 +51,11 @@ class NewtonKrylov(NonlinearSolver):
         description="J w by a Jacobian assembled once an iteration, or each by a series of order 1; auto: by series "
         "where the problem has one",
     )
+    preconditioner: Literal["operator", "triangles"] = Field(
+        "operator",
+        description="K*: the case's operator, which is J unless [operator] says otherwise, or the tangent of the same "
+        "equations by linear triangles on the same nodes, for flows",
+    )
     dimension: int = Field(40, gt=0, description="largest dimension of the Krylov space")
     globalization: Globalized = Field(  # type: ignore[assignment]
         {"kind": "backtracking"}, description="how the step length t is found"
@@ -43,13 +66,14 @@ class NewtonKrylov(NonlinearSolver):
     def steps(self, problem: NonlinearProblem, tangent: KeptTangent, start: np.ndarray) -> Iterator[Step]:
         """The iterates u_0, u_1, …"""
         jacobian, search = cached_jacobian(problem), self.globalization.search(problem)
+        kept = self.assembly(problem, jacobian.operator)
         state, eta = start, self.first_forcing
         by_series = self.products == "series" or (self.products == "auto" and problem.has_series)
         residual = problem.residual(state)
         yield Step(state)
         while True:
             size = norm(residual)
-            tangent.refresh_if_due(lambda: jacobian.operator(state))
+            tangent.refresh_if_due(lambda: kept(state))
             if size == 0.0:
                 yield Step(state)
                 continue
@@ -62,6 +86,21 @@ class NewtonKrylov(NonlinearSolver):
             yield Step(state, notes={"length": length, "contraction": contraction})
             size_now = norm(residual)
             eta = max(next_forcing(self.forcing, eta, size_now, size, found.left), SMALLEST_FORCING)
+
+    def assembly(self, problem: NonlinearProblem, operator: Callable[[np.ndarray], Any]) -> Callable[[np.ndarray], Any]:
+        """u ↦ the matrix that K* is made of, sparse (U, U).
+
+        operator : the same by the case's operator. Raises SolveError (not applicable) where triangles have no say.
+        """
+        if self.preconditioner == "operator":
+            return operator
+        asked, way_out = 'newton-krylov has preconditioner = "triangles"', 'set it to "operator", its default'
+        if not problem.has_other_discretizations:
+            raise SolveError(Status.NOT_APPLICABLE, f"{asked}, and no discretizer has made these equations: {way_out}")
+        if not problem.operator_is_jacobian:
+            raise SolveError(Status.NOT_APPLICABLE, f"{asked}, and the case has an operator of its own: {way_out}")
+        triangles = TRIANGLES.validate_python({"kind": "delaunay"})
+        return lambda u: problem.jacobian_by(triangles, u)
 
 
 def along(problem: NonlinearProblem, state: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:
