@@ -43,10 +43,14 @@ class System(Scene, ABC):
     }
 
     factor: float = Field(
-        1.0, gt=0, description="the standard start times this; a start of zeros becomes one of factors (1: as it is)"
+        default=1.0,
+        gt=0,
+        description="the standard start times this; a start of zeros becomes one of factors (1: as it is)",
     )
-    perturbation: float = Field(0.0, ge=0, description="seeded noise added to the start, relative to its largest entry")
-    seed: int = Field(0, ge=0, description="of that noise")
+    perturbation: float = Field(
+        default=0.0, ge=0, description="seeded noise added to the start, relative to its largest entry"
+    )
+    seed: int = Field(default=0, ge=0, description="of that noise")
 
     @abstractmethod
     def formula(self, u: Any) -> Any:

@@ -143,21 +143,23 @@ def run(
 def validate(
     study: StudyFile,
     settings: Settings = None,
+    quick: Quick = False,
     plugin: PluginFiles = None,
     disable_plugin: Disabled = None,
     as_json: Json = False,
 ) -> None:
-    """Check a study, and its quick form if it has one, without running it."""
+    """Check a study, and its quick form if it has one, without running it; with --quick, that form alone."""
     with ending():
-        checked = checked_study(study, settings, False, plugin, disable_plugin)
-        quick = checked_study(study, settings, True, plugin, disable_plugin, False) if checked.has_quick else None
+        checked = checked_study(study, settings, quick, plugin, disable_plugin)
+        both = not quick and checked.has_quick
+        shrunk = checked_study(study, settings, True, plugin, disable_plugin, False) if both else None
     found = {"study": checked.name, "question": checked.question, "cases": len(checked.cases)}
-    found |= {"quick_cases": len(quick.cases)} if quick else {}
+    found |= {"quick_cases": len(shrunk.cases)} if shrunk else {}
     found |= {"excluded": [asdict(excluded) for excluded in checked.excluded]} if checked.excluded else {}
     if as_json:
         typer.echo(json.dumps(found))
     else:
-        extra = f" ({len(quick.cases)} with --quick)" if quick else ""
+        extra = f" ({len(shrunk.cases)} with --quick)" if shrunk else ""
         say_excluded(checked)
         typer.echo(f"{study} is valid: {count(len(checked.cases))}{extra}. {checked.question}")
 

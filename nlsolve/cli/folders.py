@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
+from functools import cache
 from pathlib import Path
 from typing import Annotated
 
@@ -25,11 +27,12 @@ from nlsolve.cli.printing import count, print_endings, print_included, print_tab
 from nlsolve.registry.problems import StudyError, did_you_mean, problems_in
 from nlsolve.results.parameters import differing_parameters
 from nlsolve.running.packing.pack import export as packed
-from nlsolve.running.runner import load
+from nlsolve.running.runner import load, provenance_of
 from nlsolve.running.store.reading import FolderStatus, read_tables, status_of_folder
 from nlsolve.running.store.upkeep import merge_folders, remove, superfluous
-from nlsolve.show.figures import FigureError, Look, write
-from nlsolve.show.tables import built, included_tables
+from nlsolve.show.figures import FigureError, Look, content_of, drawn, write
+from nlsolve.show.staleness import Included, Now, included
+from nlsolve.show.tables import Table, built
 
 folders = typer.Typer()
 
@@ -43,13 +46,13 @@ def table(
     as_json: Json = False,
     check: Annotated[
         Path | None,
-        typer.Option(metavar="PAPER.tex", help="tell instead whether the tables that a paper includes are stale"),
+        typer.Option(metavar="PAPER.tex", help="tell instead whether what a paper includes is stale"),
     ] = None,
 ) -> None:
     """Print the declared tables of a results folder, or the endings if there are none, of whatever is finished.
 
-    With --check, tell of each table that PAPER.tex includes whether it says what the results say now; exit code 3 when
-    one does not.
+    With --check, tell of each table and figure that PAPER.tex includes whether it says what the results say now; exit
+    code 3 when one does not.
     """
     with ending():
         described, runs = read_tables(folder)
@@ -60,16 +63,14 @@ def table(
         if name is not None and refused:
             raise StudyError(*refused)
         if check is not None:
-            digests = {table.spec.name: table.grid().digest for table in tables}
-            included = [each for each in included_tables(check, described.name, digests) if name in (None, each.table)]
+            found = included(check, described.name, _contents(folder, tables))
+            found = [each for each in found if name is None or (each.noun, each.name) == ("table", name)]
     if len(runs) < len(described.cases):
         say(f"{folder}: {len(runs)} of {count(len(described.cases))} are finished")
     for sentence in refused:
         say(sentence)
     if check is not None:
-        print_included(included, folder, as_json)
-        if any(each.reason for each in included):
-            raise typer.Exit(ExitCode.NOT_FOUND)
+        _tell(found, folder, as_json)
         return
     if as_json:
         typer.echo(json.dumps({table.spec.name: table.long() for table in tables}))
@@ -79,6 +80,30 @@ def table(
     if not described.tables:
         shared = [name for name in differing_parameters(runs) if runs[name].notna().all()]
         print_endings(described.question, runs, shared)
+
+
+def _tell(found: Sequence[Included], folder: Path, as_json: bool) -> None:
+    """Print of what a paper includes whether it is stale. Raises typer.Exit where something is."""
+    print_included(found, folder, as_json)
+    if any(each.reason for each in found):
+        raise typer.Exit(ExitCode.NOT_FOUND)
+
+
+def _contents(folder: Path, tables: Sequence[Table]) -> Now:
+    """What each table and figure of a results folder tells now, as a digest; a figure is drawn when it is asked for."""
+    digests = {table.spec.name: table.grid().digest for table in tables}
+    results = cache(load)
+
+    def content(noun: str, name: str) -> str | None:
+        if noun == "table":
+            return digests.get(name)
+        spec = next((spec for spec in results(folder).study.figures if spec.name == name), None)
+        try:
+            return None if spec is None else content_of(spec, drawn(spec, results(folder).frames)[1])
+        except FigureError:
+            return None
+
+    return content
 
 
 @folders.command()
@@ -95,10 +120,16 @@ def figure(
     ] = None,
     resolution: Annotated[int | None, typer.Option(help="dots per inch of PNG")] = None,
     to: Annotated[Path | None, typer.Option(metavar="FOLDER", help="where to; default: figures in DIR")] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="machine-readable output of --check")] = False,
+    check: Annotated[
+        Path | None,
+        typer.Option(metavar="PAPER.tex", help="tell instead whether the figures that a paper includes are stale"),
+    ] = None,
 ) -> None:
     """Draw the declared figures of a results folder again, of whatever is finished, perhaps wider or in other formats.
 
-    Nothing is run. What no option says is as the study says.
+    Nothing is run. What no option says is as the study says. With --check, nothing is drawn: it is told of each figure
+    that PAPER.tex includes whether it shows what the results say now; exit code 3 when one does not.
     """
     given = {"width": width, "font": font, "font_size": font_size, "formats": formats, "resolution": resolution}
     with ending():
@@ -107,11 +138,17 @@ def figure(
         names = [spec.name for spec in results.study.figures]
         if name is not None and name not in names:
             raise StudyError(f"{folder}: there is no figure {name!r}; {did_you_mean(name, names)}")
+        if check is not None:
+            found = included(check, results.study.name, _contents(folder, ()))
+            wanted = [each for each in found if each.noun == "figure" and name in (None, each.name)]
+            _tell(wanted, folder, as_json)
+            return
         told = [*results.notes, *([] if names else [f"{folder}: its study declares no figures"])]
         for spec in results.study.figures:
             if name in (None, spec.name):
                 try:
-                    written = write(spec.with_(**look.said), results.frames, to or folder / "figures")
+                    made = provenance_of(results.study, folder)
+                    written = write(spec.with_(**look.said), results.frames, to or folder / "figures", made)
                 except FigureError as error:
                     if name is not None:
                         raise StudyError(str(error)) from error

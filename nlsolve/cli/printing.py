@@ -24,7 +24,8 @@ from nlsolve.results.verdicts import doubt, number, status_of
 from nlsolve.running.results import Results
 from nlsolve.running.retry import is_final
 from nlsolve.running.store.reading import output_file
-from nlsolve.show.tables import Included, Table
+from nlsolve.show.staleness import Included
+from nlsolve.show.tables import Table
 from nlsolve.study.study import Study
 
 MOST_RULED_ROWS, MOST_RULED_COLUMNS, MOST_RULED_CELLS = 500, 40, 5000
@@ -108,14 +109,17 @@ def print_table(table: Table) -> None:
 
 
 def print_included(included: Sequence[Included], folder: Path, as_json: bool) -> None:
-    """Print of each table that a paper includes whether it says what the results in a folder say."""
+    """Print of what a paper includes whether it says what the results in a folder say."""
     if as_json:
-        rows = [{"file": str(each.file), "table": each.table, "reason": each.reason} for each in included]
+        rows = [{"file": str(each.file), each.noun: each.name, "reason": each.reason} for each in included]
         typer.echo(json.dumps(rows))
-        return
-    for each in included:
-        way_out = f"; a fresh one is {folder / 'tables' / each.table}.tex after nlsolve run" if each.reason else ""
-        typer.echo(f"{each.file}: table {each.table}: {each.reason or 'as the results say'}{way_out}")
+    for each in () if as_json else included:
+        fresh = {
+            "table": f"; a fresh one is {folder / 'tables' / each.name}.tex after nlsolve run",
+            "figure": f"; nlsolve figure {folder} {each.name} draws it again",
+        }
+        way_out = fresh[each.noun] if each.reason else ""
+        typer.echo(f"{each.file}: {each.noun} {each.name}: {each.reason or 'as the results say'}{way_out}")
 
 
 def _is_large(frame: pd.DataFrame) -> bool:

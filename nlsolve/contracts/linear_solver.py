@@ -47,7 +47,7 @@ class LinearSolver(Component, ABC):
     noun: ClassVar[str] = "linear"
     default_kind: ClassVar[str | None] = "auto"
 
-    refinement: int = Field(0, ge=0, description="steps of iterative refinement after each triangular solve")
+    refinement: int = Field(default=0, ge=0, description="steps of iterative refinement after each triangular solve")
 
     @abstractmethod
     def factorize(self, matrix: Any, previous: Factors | None = None) -> Factors:

@@ -222,7 +222,8 @@ class NonlinearProblem(ABC):
         over random signs z, by differences of R.
         """
         products = self.differences(u, sizes[:, None] * random_signs(len(u), PROBES))
-        return np.sqrt((products**2).mean(axis=1))
+        terms: Array = np.sqrt((products**2).mean(axis=1))
+        return terms
 
     def differences(self, u: Array, directions: Array) -> Array:
         """About J(u) W for directions W of the size of the unknowns, both (U, C)."""

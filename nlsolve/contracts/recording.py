@@ -23,7 +23,7 @@ class IterateRecording(Component):
     incidental: ClassVar[frozenset[str]] = frozenset({"iterates"})
 
     iterates: bool = Field(
-        False,
+        default=False,
         description="keep the state of every row of `steps` beside the case, for results.iterates; a case that was run "
         "without is run again",
     )
@@ -39,7 +39,7 @@ class StoredState(Component):
 
     results: str = Field(min_length=1, description="a results folder, relative to the folder the study is run in")
     case: str = Field(min_length=1, description="identity of a case in it, from the column `case` of its results")
-    file: InputFile = Field("", description="the file of that state, which follows from the two: leave it out")
+    file: InputFile = Field(default="", description="the file of that state, which follows from the two: leave it out")
 
     @model_validator(mode="before")
     @classmethod
@@ -87,4 +87,4 @@ class SystemStart(Component):
 
     noun: ClassVar[str] = "start"
 
-    stored: StoredState | None = Field(None, description="begin with the state of a case in a results folder")
+    stored: StoredState | None = Field(default=None, description="begin with the state of a case in a results folder")

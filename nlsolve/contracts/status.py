@@ -49,7 +49,7 @@ class Status(Enum):
     @property
     def sentence(self) -> str:
         """What happened, in a sentence."""
-        return self.value
+        return str(self.value)
 
 
 STOPPED = frozenset({Status.TIMED_OUT, Status.OUT_OF_MEMORY})

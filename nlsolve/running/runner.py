@@ -7,7 +7,6 @@ import time
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from contextlib import closing
 from dataclasses import replace
-from datetime import date
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -30,7 +29,8 @@ from nlsolve.running.store.store import Store
 from nlsolve.running.timing.exclusive import CountingTurns, ExclusiveTurns
 from nlsolve.running.turns import Turns
 from nlsolve.show.figures import FigureError, write
-from nlsolve.show.tables import PREAMBLE, PREAMBLE_FILE, Provenance, built
+from nlsolve.show.provenance import Provenance
+from nlsolve.show.tables import PREAMBLE, PREAMBLE_FILE, built
 from nlsolve.study.study import Study
 from nlsolve.study.timing import Timing
 
@@ -185,6 +185,11 @@ def _unfinished(finished: int, planned: int, judges: bool = False) -> tuple[str,
     return (f"{finished} of {planned} cases are finished{later}",) if finished < planned else ()
 
 
+def provenance_of(study: Study, folder: Path) -> Provenance:
+    """Where what is shown of a study comes from, whose results are in this folder."""
+    return Provenance.today(study.name, f"{study.command} --out {shlex.quote(str(folder))}" if study.command else "")
+
+
 def _show(store: Store, study: Study, frames: Frames, remarks: Sequence[str]) -> tuple[str, ...]:
     """Write tables, figures and the report. Returns a sentence for each that cannot be shown; the results stay.
 
@@ -192,8 +197,7 @@ def _show(store: Store, study: Study, frames: Frames, remarks: Sequence[str]) ->
     """
     report = import_module("nlsolve.show.report")  # loads jinja2, which a run with nothing to show does without
     tables, notes = built(study.tables, frames.runs)
-    command = f"{study.command} --out {shlex.quote(str(store.folder))}" if study.command else ""
-    provenance = Provenance(study.name, command, report.machine_facts()["nlsolve"], date.today().isoformat())
+    provenance = provenance_of(study, store.folder)
     if tables:
         store.write_text(f"tables/{PREAMBLE_FILE}", PREAMBLE)
     shown: dict[str, pd.DataFrame] = {}
@@ -212,7 +216,7 @@ def _show(store: Store, study: Study, frames: Frames, remarks: Sequence[str]) ->
         for spec in study.figures:
             caption = spec.caption or spec.name
             try:
-                written = write(spec, frames, store.folder / "figures")
+                written = write(spec, frames, store.folder / "figures", provenance)
             except FigureError as error:
                 notes.append(str(error))
                 pictures.append(report.Picture(spec.name, caption))

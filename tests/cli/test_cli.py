@@ -181,6 +181,7 @@ def test_table_tells_whether_a_paper_is_stale(tmp_path):
 def test_validate(tmp_path):
     path = write_study(tmp_path)
     assert nlsolve("validate", path).stdout == f"{path} is valid: 4 cases (1 with --quick). How many branches?\n"
+    assert nlsolve("validate", path, "--quick").stdout == f"{path} is valid: 1 case. How many branches?\n"
     document = json.loads(nlsolve("validate", path, "--json").stdout)
     assert document == {"study": "study", "question": "How many branches?", "cases": 4, "quick_cases": 1}
     bad = write_study(tmp_path, ('"scene.side" = "right"', '"scene.sid" = "right"'))

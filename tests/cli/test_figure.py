@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 from pathlib import Path
 from typing import Any
@@ -130,3 +131,46 @@ def test_loaded_results_have_the_figures_of_their_study(tmp_path: Path) -> None:
     declared = Study.from_toml(tmp_path / "study.toml").figures
     assert house.load("o").study.figures == declared
     assert [figure.width for figure in declared] == ["double", "60 mm"]
+
+
+PAPER = r"\input{o/tables/work}\includegraphics{o/figures/first}\includegraphics{o/figures/second}"
+
+
+@pytest.fixture
+def paper(tmp_path: Path) -> Path:
+    """A study with a table, run, and a paper with all that it has."""
+    table = '\n[[table]]\nname = "work"\nrows = "solver.order"\ncolumns = "solver.tolerance"\nvalue = "tangents"\n'
+    assert nlsolve("run", write_study(tmp_path, text=STUDY + FIGURES + table), "--out", "o").exit_code == 0
+    path = tmp_path / "paper.tex"
+    path.write_text(PAPER, encoding="utf-8")
+    return path
+
+
+def test_a_paper_as_the_results_say(paper: Path) -> None:
+    told = nlsolve("table", "o", "--check", paper)
+    assert (told.exit_code, told.stderr) == (0, "")
+    assert [line.partition(": ")[2] for line in told.stdout.splitlines()] == [
+        "table work: as the results say",
+        "figure first: as the results say",
+        "figure second: as the results say",
+    ]
+    told = nlsolve("figure", "o", "--check", paper, "--json")
+    assert told.exit_code == 0
+    assert [(row["figure"], row["reason"]) for row in json.loads(told.stdout)] == [("first", ""), ("second", "")]
+
+
+def test_a_wider_figure_is_not_stale_and_one_of_other_cases_is(paper: Path, tmp_path: Path) -> None:
+    nlsolve("figure", "o", "first", "--width", "60mm", "--to", "o/figures")
+    assert nlsolve("figure", "o", "--check", paper).exit_code == 0
+    fewer = FIGURES.replace(
+        'group = "solver.tolerance"\n', 'group = "solver.tolerance"\nwhere = { "solver.order" = 10 }\n'
+    )
+    study = write_study(tmp_path, text=STUDY + fewer.replace('name = "second"', 'name = "third"'))
+    assert nlsolve("run", study, "--out", "new").exit_code == 0
+    told = nlsolve("figure", "new", "--check", paper)
+    assert told.exit_code == 3
+    assert [line.partition(": ")[2] for line in told.stdout.splitlines()] == [
+        "figure first: stale, the results tell something else now; nlsolve figure new first draws it again",
+        "figure second: the results have no such figure now; nlsolve figure new second draws it again",
+    ]
+    assert nlsolve("figure", "new", "first", "--check", paper).stdout.count("\n") == 1

@@ -27,8 +27,10 @@ class AdaptiveNodes(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
     kind: Literal["adaptive"] = "adaptive"
-    error: float = Field(0.005, gt=0, lt=1, description="largest error of the velocity, relative, by its estimate")
-    most_nodes: int = Field(30_000, gt=0, description="nodes of the largest cloud")
-    most_rounds: int = Field(8, gt=0, description="clouds made from a solution, one after the other")
-    spacing: float = Field(0.25, gt=0, description="largest spacing [mm]")
-    seed: int = Field(0, ge=0, description="seed of the nodes that are scattered")
+    error: float = Field(
+        default=0.005, gt=0, lt=1, description="largest error of the velocity, relative, by its estimate"
+    )
+    most_nodes: int = Field(default=30_000, gt=0, description="nodes of the largest cloud")
+    most_rounds: int = Field(default=8, gt=0, description="clouds made from a solution, one after the other")
+    spacing: float = Field(default=0.25, gt=0, description="largest spacing [mm]")
+    seed: int = Field(default=0, ge=0, description="seed of the nodes that are scattered")

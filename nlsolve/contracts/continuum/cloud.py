@@ -42,7 +42,8 @@ class Cloud:
     @cached_property
     def nearest_distance(self) -> Array:
         """Distance of every node to its nearest neighbour, shape (N,) [mm]."""
-        return scipy.spatial.cKDTree(self.nodes).query(self.nodes, 2)[0][:, 1]
+        distances: Array = scipy.spatial.cKDTree(self.nodes).query(self.nodes, 2)[0]
+        return distances[:, 1]
 
     @cached_property
     def on_boundary(self) -> NDArray[np.bool_]:

@@ -92,7 +92,8 @@ class Operators:
 
     def strain_rate(self, velocity: Array) -> Array:
         """ε̇ at the M strain points, (3, M) ordered xx, yy, xy [1/s], of the `velocity` (N, 2) of all nodes."""
-        return (self.strain.rate @ velocity.ravel()).reshape(3, -1)
+        rates: Array = self.strain.rate @ velocity.ravel()
+        return rates.reshape(3, -1)
 
 
 class Discretizer(Component, ABC):

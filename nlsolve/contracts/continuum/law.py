@@ -6,6 +6,7 @@ series the coefficients of the homotopy. Units: mm, s, MPa, tonne.
 
 from __future__ import annotations
 
+import math
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -29,7 +30,7 @@ class PowerForm:
     @property
     def shear_consistency(self) -> float:
         """m in τ = m γ̇ⁿ for simple shear, where ε̄ = γ̇/√3:  m = K 3^(−(n+1)/2)."""
-        return self.consistency * 3.0 ** (-(self.index + 1.0) / 2.0)
+        return self.consistency * math.pow(3.0, -(self.index + 1.0) / 2.0)
 
 
 class ConstitutiveLaw(Component, ABC):

@@ -25,21 +25,25 @@ class Physics(Component):
 
     noun: ClassVar[str] = "physics"
 
-    density: float = Field(2.81e-9, gt=0, description="mass density [t/mm³]")
-    inertia: bool = Field(False, description="keep the term ρ (V − V_k)/Δt")
-    convection: bool = Field(False, description="keep the term ρ (V·∇) V; for fixed nodes only")
-    penalty: float | None = Field(None, ge=0, description="λ, in the unit of penalty_unit; absent: no volumetric term")
+    density: float = Field(default=2.81e-9, gt=0, description="mass density [t/mm³]")
+    inertia: bool = Field(default=False, description="keep the term ρ (V − V_k)/Δt")
+    convection: bool = Field(default=False, description="keep the term ρ (V·∇) V; for fixed nodes only")
+    penalty: float | None = Field(
+        default=None, ge=0, description="λ, in the unit of penalty_unit; absent: no volumetric term"
+    )
     penalty_unit: Literal["reference", "local", "absolute"] = Field(
-        "reference",
+        default="reference",
         description="λ is a multiple of μ at the reference strain rate, of μ where it acts, or given in MPa s",
     )
     divergence_tolerance: float | None = Field(
-        None,
+        default=None,
         gt=0,
         description="‖div V‖/‖ε̄‖ to be reached by iterating the pressure (augmented Lagrangian); absent: penalty alone",
     )
     pressure_iterations: int = Field(
-        60, gt=0, description="iterations of the pressure per increment, where a divergence_tolerance asks for them"
+        default=60,
+        gt=0,
+        description="iterations of the pressure per increment, where a divergence_tolerance asks for them",
     )
 
     @model_validator(mode="after")
@@ -71,8 +75,8 @@ class TimeSteps(Component):
 
     noun: ClassVar[str] = "time"
 
-    horizon: float | None = Field(None, gt=0, description="end of the march [s]; absent: one steady state")
-    increment: float = Field(1e-4, gt=0, description="Δt, time step of the march [s]")
+    horizon: float | None = Field(default=None, gt=0, description="end of the march [s]; absent: one steady state")
+    increment: float = Field(default=1e-4, gt=0, description="Δt, time step of the march [s]")
 
     @property
     def increments(self) -> int:
@@ -85,20 +89,22 @@ class NodeMotion(Component):
 
     noun: ClassVar[str] = "motion"
 
-    nodes: Literal["fixed", "lagrangian"] = Field("fixed", description="nodes stay, or move with the material")
-    markers: bool = Field(False, description="carry material markers, from each node at t = 0; shifted nodes always do")
+    nodes: Literal["fixed", "lagrangian"] = Field(default="fixed", description="nodes stay, or move with the material")
+    markers: bool = Field(
+        default=False, description="carry material markers, from each node at t = 0; shifted nodes always do"
+    )
     shifting: float = Field(
-        0.0, ge=0, le=1, description="moving nodes: part of the overlap by which near ones part in an increment"
+        default=0.0, ge=0, le=1, description="moving nodes: part of the overlap by which near ones part in an increment"
     )
     skin: float = Field(
-        0.0,
+        default=0.0,
         ge=0,
         le=1,
         description="moving nodes: neighbours and triangles are kept until the distance of two near nodes has changed "
         "by this part of the nearest one's; 0: found anew in each increment",
     )
     rates: Literal["of-velocity", "accumulated"] = Field(
-        "of-velocity",
+        default="of-velocity",
         description="moving nodes: strain rates are those of the velocity at the present nodes, or carried with the "
         "material, to which each increment adds that of its velocity",
     )
@@ -139,9 +145,11 @@ class Recording(IterateRecording):
     """What is recorded of a case beside its last state; `times` and `probe` are of flows only."""
 
     times: tuple[Annotated[float, Field(ge=0)], ...] = Field(
-        (), description="times at which the fields are recorded, besides the last [s]"
+        default=(), description="times at which the fields are recorded, besides the last [s]"
     )
-    probe: tuple[float, float] | None = Field(None, description="place whose nearest node is recorded in time [mm]")
+    probe: tuple[float, float] | None = Field(
+        default=None, description="place whose nearest node is recorded in time [mm]"
+    )
 
     @model_validator(mode="before")
     @classmethod

@@ -56,10 +56,11 @@ class Description:
     cases: tuple[Planned, ...]
     tables: tuple[TableSpec, ...]
     figures: tuple[BaseFigure, ...] = ()
+    command: str = ""
 
     def study(self) -> Study:
         """The study with its tables and figures, without its cases."""
-        return Study(self.name, self.question, (), self.tables, self.figures)
+        return Study(self.name, self.question, (), self.tables, self.figures, command=self.command)
 
 
 def describe(study: Study, identities: Mapping[str, Identity]) -> dict[str, Any]:
@@ -67,6 +68,7 @@ def describe(study: Study, identities: Mapping[str, Identity]) -> dict[str, Any]
     return {
         "name": study.name,
         "question": study.question,
+        "command": study.command,
         "cases": [
             {
                 "key": identities[case.id].key if case.id in identities else case.id,
@@ -92,7 +94,8 @@ def description_of(folder: Path) -> Description | None:
         cases = tuple(Planned(**case) for case in document["cases"])
         tables = tuple(TableSpec.model_validate(table) for table in document["tables"])
         figures = FIGURES.validate_python(document.get("figures", []))
-        return Description(document["name"], document["question"], cases, tables, figures)
+        command = str(document.get("command", ""))
+        return Description(document["name"], document["question"], cases, tables, figures, command)
     except (OSError, ValueError, TypeError, KeyError, ValidationError):
         return None
 

@@ -7,6 +7,7 @@ as its look says, as PNG, PDF, SVG or PGF with its data beside it, the same byte
 
 from __future__ import annotations
 
+import json
 from dataclasses import dataclass
 from difflib import get_close_matches
 from pathlib import Path
@@ -31,6 +32,7 @@ from nlsolve.show.figures.paper.look import COLUMN, Look
 from nlsolve.show.figures.solved import DataFigure, PerformanceFigure
 from nlsolve.show.figures.style import FONTS, style_of
 from nlsolve.show.figures.trade import TradeFigure
+from nlsolve.show.provenance import Provenance, digest_of
 
 __all__ = [
     "BaseFigure",
@@ -48,6 +50,7 @@ __all__ = [
     "ProfileFigure",
     "TradeFigure",
     "Written",
+    "content_of",
     "draw",
     "drawn",
     "save",
@@ -117,14 +120,22 @@ def drawn(spec: BaseFigure, frames: Frames) -> tuple[plotting.Figure, pd.DataFra
     return figure, told
 
 
-def write(spec: BaseFigure, frames: Frames, folder: Path) -> Written:
+def content_of(spec: BaseFigure, told: pd.DataFrame) -> str:
+    """A digest of what a figure shows, as `drawn` tells it, and of its declaration without look and caption."""
+    shown = spec.model_dump(mode="json", exclude={*Look.model_fields, "caption", "lanes"}, exclude_defaults=True)
+    return digest_of(json.dumps([spec.kind_name(), shown, told.to_csv(index=False)]))
+
+
+def write(spec: BaseFigure, frames: Frames, folder: Path, provenance: Provenance | None = None) -> Written:
     """Write the pictures of a declared figure, the data beside them, and its animation, into a folder.
 
+    provenance : where it comes from, which the pictures say.
     Raises FigureError when there is nothing to draw.
     """
     figure, told = drawn(spec, frames)
     try:
-        paths = save(figure, folder, spec.name, spec)
+        mark = None if provenance is None else provenance.of("figure", spec.name, content_of(spec, told))
+        paths = save(figure, folder, spec.name, spec, mark)
     except (ValueError, plotting.LatexError) as error:  # what matplotlib and TeX raise
         raise spec.refuse(f"mathematics in one of its texts cannot be set: {' '.join(str(error).split())}") from error
     if spec.data is not False:

@@ -8,7 +8,6 @@ import platform
 from base64 import b64encode
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 import pandas as pd
@@ -17,8 +16,8 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from nlsolve.results.aggregates import shared_ways
 from nlsolve.results.parameters import differing_parameters
 from nlsolve.show.expectations import Finding
+from nlsolve.show.provenance import Provenance, version_of
 from nlsolve.show.report.sheets import audits, cost, cost_in_words, doubts, failures, sheet_of
-from nlsolve.show.tables import Provenance
 
 SCREEN_DOTS_PER_INCH = 110
 MEDIA = {"png": "image/png", "apng": "image/apng", "gif": "image/gif", "mp4": "video/mp4"}
@@ -133,12 +132,5 @@ def grouped_by_reason(excluded: Sequence[tuple[str, str]]) -> dict[str, list[str
 
 def machine_facts() -> dict[str, str]:
     """Versions of libraries and the number of processors, on which the numbers of a report depend."""
-    versions = {name: _version(name) for name in ("nlsolve", "numpy", "scipy")}
+    versions = {name: version_of(name) for name in ("nlsolve", "numpy", "scipy")}
     return {**versions, "Python": platform.python_version(), "processors": str(os.cpu_count() or "unknown")}
-
-
-def _version(name: str) -> str:
-    try:
-        return version(name)
-    except PackageNotFoundError:  # run from a checkout that is not installed
-        return "(not installed)"

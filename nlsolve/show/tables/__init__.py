@@ -7,8 +7,6 @@ strategy is cheapest where (`crossover`).
 from __future__ import annotations
 
 from nlsolve.show.tables.latex.floats import PREAMBLE, PREAMBLE_FILE
-from nlsolve.show.tables.latex.provenance import Provenance
-from nlsolve.show.tables.latex.staleness import Included, included_tables
 from nlsolve.show.tables.layout import build, built, check
 from nlsolve.show.tables.spec import TableSpec
 from nlsolve.show.tables.table import Table
@@ -16,12 +14,9 @@ from nlsolve.show.tables.table import Table
 __all__ = [
     "PREAMBLE",
     "PREAMBLE_FILE",
-    "Included",
-    "Provenance",
     "Table",
     "TableSpec",
     "build",
     "built",
     "check",
-    "included_tables",
 ]

@@ -11,9 +11,9 @@ from rich.markup import escape
 from rich.table import Table as RichTable
 
 from nlsolve.results.frames import json_rows
-from nlsolve.show.tables.latex.floats import latex
+from nlsolve.show.provenance import Provenance
+from nlsolve.show.tables.latex.floats import latex, packages_of
 from nlsolve.show.tables.latex.grid import Grid, grid_of
-from nlsolve.show.tables.latex.provenance import Provenance
 from nlsolve.show.tables.markdown import escaped
 from nlsolve.show.tables.spec import TableSpec, written
 
@@ -102,7 +102,9 @@ class Table:
         """What a paper shows, in LaTeX that fits into a column; what it comes from and what it needs as comments."""
         grid = self.grid()
         body = latex(self.spec, grid)
-        return body if provenance is None else provenance.around(self.spec, grid.digest, body)
+        if provenance is None:
+            return body
+        return provenance.of("table", self.spec.name, grid.digest).around(body, packages_of(self.spec))
 
     def _labelled(self, frame: pd.DataFrame) -> pd.DataFrame:
         """A frame whose rows and columns are called as the declaration says."""

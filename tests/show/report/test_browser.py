@@ -18,8 +18,8 @@ from pictures import results, spec_of
 
 from nlsolve.results.frames import Frames
 from nlsolve.show.figures import write
+from nlsolve.show.provenance import Provenance
 from nlsolve.show.report import Picture, write_report
-from nlsolve.show.tables import Provenance
 
 BAD = '"><script>document.title="taken"</script><img src=x onerror=document.title="taken"> & \'<b>'
 BROWSERS = ("chromium", "chromium-browser", "google-chrome")

@@ -18,8 +18,9 @@ from nlsolve.results.columns import RUNS as RESULTS
 from nlsolve.results.frames import Frames
 from nlsolve.show.expectations import Finding
 from nlsolve.show.figures import LineFigure, write
+from nlsolve.show.provenance import Provenance
 from nlsolve.show.report import Picture, machine_facts, write_report
-from nlsolve.show.tables import Provenance, TableSpec, build
+from nlsolve.show.tables import TableSpec, build
 
 RUNS = pd.DataFrame(
     {

@@ -10,14 +10,20 @@ from nlsolve.show import plotting
 from nlsolve.show.figures.paper.look import FORMATS, RESOLUTION, Format, Look
 from nlsolve.show.figures.paper.tex import ENGINES, PREAMBLE, engine, texts_in_tex
 from nlsolve.show.figures.style import FONTS, style_of
+from nlsolve.show.provenance import Mark
 
 PREAMBLE_FILE = "preamble.tex"
+PACKAGES = ("pgf",)
 WITHOUT_DATES: dict[Format, dict[str, Any]] = {"pdf": {"CreationDate": None}, "svg": {"Date": None}}
+"""The time of day would make other bytes every time."""
 
 
-def save(figure: plotting.Figure, folder: Path, name: str, look: Look | None = None) -> list[Path]:
+def save(
+    figure: plotting.Figure, folder: Path, name: str, look: Look | None = None, mark: Mark | None = None
+) -> list[Path]:
     """Write the pictures of a figure into the folder, NAME.png and NAME.pdf unless the look says otherwise.
 
+    mark : where it comes from, for its metadata; comments of a PGF.
     Pictures that cannot be made here are left out, see `missing`. Returns the paths. Raises ValueError where TeX cannot
     set a text of a figure in PGF.
     """
@@ -31,8 +37,11 @@ def save(figure: plotting.Figure, folder: Path, name: str, look: Look | None = N
         with plotting.rc_context(style_of(look)):
             if form == "pgf":
                 _save_pgf(figure, paths[-1], look)
+                if mark is not None:
+                    paths[-1].write_text(mark.around(paths[-1].read_text("utf-8"), PACKAGES), encoding="utf-8")
             else:
-                figure.savefig(paths[-1], dpi=look.resolution or RESOLUTION, metadata=WITHOUT_DATES.get(form))
+                said = {**WITHOUT_DATES.get(form, {}), **({} if mark is None else mark.metadata(form))}
+                figure.savefig(paths[-1], dpi=look.resolution or RESOLUTION, metadata=said)
     if "pgf" in (look.formats or ()) and not missing("pgf"):
         (folder / PREAMBLE_FILE).write_text(PREAMBLE, encoding="utf-8")
     return paths

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
 import re
 from collections.abc import Sequence
@@ -17,13 +16,12 @@ from nlsolve.results.columns import RUNS
 from nlsolve.results.parameters import LETTERS
 from nlsolve.results.verdicts import number
 from nlsolve.show.figures.style import symbol
+from nlsolve.show.provenance import digest_of
 from nlsolve.show.tables.latex.words import NUMBER, Words, of_symbol, of_text, of_value
 from nlsolve.show.tables.numbers import FIXED, alike
 from nlsolve.show.tables.spec import Align, TableSpec
 
 PERCENT = re.compile(rf"({NUMBER.pattern})%")
-DIGITS = 16
-"""Digits of a digest."""
 
 
 @dataclass(frozen=True)
@@ -65,12 +63,6 @@ class Grid:
         """A digest of all that is told, and not of how it is laid out."""
         columns = [[[head.line for head in column.heads], column.cells] for column in (*self.labels, *self.columns)]
         return digest_of(json.dumps([self.caption, self.notes, columns, self.above.line]))
-
-
-def digest_of(text: str) -> str:
-    """A digest of a text, whatever its lines end with."""
-    lines = "\n".join(line.rstrip() for line in text.strip().splitlines())
-    return hashlib.sha256(lines.encode()).hexdigest()[:DIGITS]
 
 
 def grid_of(spec: TableSpec, cells: pd.DataFrame, shown: Sequence[str], notes: Sequence[str]) -> Grid:
