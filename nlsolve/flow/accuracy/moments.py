@@ -30,10 +30,15 @@ COUNT = 64
 WIDEST, NARROWEST = 6.0, 2.5
 """Radii of discs in spacings. Wider discs hardly answer to what is wrong in one place; narrower ones have few nodes."""
 
+FROM_WALLS = 0.8
+"""Radii of discs in distances to the walls: where stresses fall as 1/r² from a tool in a wide flow, a disc that reaches
+the tool would need far more angles.
+"""
+
 APART = 0.75
 """Centres of discs keep out of this share of the radius of others."""
 
-ANGLES = 12
+ANGLES = 20
 ABSCISSAE, WEIGHTS = np.polynomial.legendre.leggauss(3)
 
 
@@ -50,7 +55,7 @@ class Discs:
         spacing = spacings(cloud.nodes, edges_of(scipy.spatial.Delaunay(cloud.nodes).simplices))[cloud.interior]
         nodes = cloud.nodes[cloud.interior]
         to_walls = scipy.spatial.cKDTree(cloud.nodes[cloud.boundary]).query(nodes)[0]
-        radii = np.minimum(to_walls, WIDEST * spacing)
+        radii = np.minimum(FROM_WALLS * to_walls, WIDEST * spacing)
         radii[radii < NARROWEST * spacing] = 0.0
         chosen: list[tuple[float, float, float]] = []
         while len(chosen) < COUNT and radii.max(initial=0.0) > 0.0:
