@@ -56,7 +56,8 @@ def compiler() -> Any:
         return None
     try:
         numba = import_module("numba")  # what builds no operators does without
-        import_module("numba.extending").overload(each)(lambda begin, end: lambda begin, end: range(begin, end))
+        overload = import_module("numba.extending").overload(each, inline="always")  # inline: so loops become vectors
+        overload(lambda begin, end: lambda begin, end: range(begin, end))
     except ImportError as error:  # it refuses versions of numpy that it does not know yet
         warnings.warn(f"numpy computes the weights, as numba cannot be used: {error}", RuntimeWarning, stacklevel=2)
         return None

@@ -46,21 +46,23 @@ def kept(corners: np.ndarray, nodes: np.ndarray, walls: np.ndarray) -> np.ndarra
     tie = TIE * float((x * x + y * y).max())
     if (doubled_areas(x, y, *corners.T) <= 0.0).any():
         return None
-    corners, flipped = corners.copy(), False
+    corners, flipped, near = corners.copy(), False, np.arange(len(corners))
     for _ in range(MOST_ROUNDS):
-        quads, beside, hull = quadrilaterals(corners)
+        quads, beside, hull = quadrilaterals(corners[near])
         if not flipped and not _is_convex(hull, x, y, walls, tie):
             return None
         inside, size = _in_circle(x[quads], y[quads])
         wrong = np.flatnonzero(inside > tie * size)
         if not len(wrong):
             return ordered(corners) if flipped else corners
-        chosen = wrong[_alone(beside[:, wrong], len(corners))]
-        (a, b, c, d), (one, other) = quads[:, chosen], beside[:, chosen]
+        chosen = wrong[_alone(beside[:, wrong], len(near))]
+        (a, b, c, d), (one, other) = quads[:, chosen], near[beside[:, chosen]]
         corners[one], corners[other] = np.stack([a, d, c], axis=1), np.stack([d, b, c], axis=1)
         if (doubled_areas(x, y, *corners[[*one, *other]].T) <= 0.0).any():
             return None
-        flipped = True
+        doubtful = np.zeros(len(nodes), dtype=bool)
+        doubtful[quads[:, wrong]] = True
+        near, flipped = np.flatnonzero(doubtful[corners].any(axis=1)), True  # no other edge can have become wrong
     return None
 
 

@@ -17,9 +17,6 @@ from nlsolve_discretizers.kernels.ranking import ranked
 SPARE = 8
 """Sources that are listed beyond those needed, where a motion is to follow."""
 
-FEW = 60_000
-"""Distances that are compared in less time than it takes to make a tree."""
-
 TIE = 1e-12
 """Two sources are equally near whose distances differ by less, relatively: the tree decides which is the last one."""
 
@@ -76,23 +73,13 @@ class Lists:
         index, distance = ranked(sources, targets, self.index, rows, numbers)
         now = Lists(sources, targets, index, distance, reach, self.count)
         which = np.flatnonzero(~(distance[:, self.count - 1] < reach))
-        if not len(which):
-            return now
-        ask = now._compared if len(which) * len(sources) <= FEW else now.query
-        return now._filled(which, ask(index.shape[1], which))
+        return now._filled(which, now.query(index.shape[1], which, quick=True)) if len(which) else now
 
     def _filled(self, which: np.ndarray, found: tuple[np.ndarray, np.ndarray]) -> Lists:
         """These lists, still in nobody's hands, with those `found` for the targets `which` written into them."""
         self.distance[which], self.index[which] = found
         self.reach[which] = self.distance[which, -1] if self.index.shape[1] < len(self.sources) else np.inf
         return self
-
-    def _compared(self, count: int, which: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """What `query` gives, by comparing all distances; equal ones may be in another order."""
-        (x, y), (u, v) = self.sources.T, self.targets[which].T[..., None]
-        near = np.argpartition((x - u) ** 2 + (y - v) ** 2, count - 1, axis=1)[:, :count]
-        index, distance = ranked(self.sources, self.targets[which], near, *_as_they_are(len(which), len(self.sources)))
-        return distance, index
 
     def nearest(self) -> tuple[np.ndarray, np.ndarray]:
         """Distances and numbers of the `count` nearest sources of all targets, (T, count) each."""
@@ -103,9 +90,13 @@ class Lists:
             distance[tied], index[tied] = self.query(self.count, tied)
         return distance, index
 
-    def query(self, count: int, which: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Distances and numbers of the `count` nearest sources of the targets `which`, (W, count) each, by the tree."""
-        distance, index = self.tree.query(self.targets[which], np.arange(1, count + 1))
+    def query(self, count: int, which: np.ndarray, quick: bool = False) -> tuple[np.ndarray, np.ndarray]:
+        """Distances and numbers of the `count` nearest sources of the targets `which`, (W, count) each, by the tree.
+
+        quick : by one that is made in half the time, and may have equal distances in another order.
+        """
+        tree = scipy.spatial.cKDTree(self.sources, compact_nodes=False, balanced_tree=False) if quick else self.tree
+        distance, index = tree.query(self.targets[which], np.arange(1, count + 1))
         return distance, index
 
     @cached_property

@@ -113,7 +113,7 @@ class Triangles:
         length = np.linalg.norm(self.cloud.nodes[ends[inner, 0]] - self.cloud.nodes[ends[inner, 1]], axis=1)
         merit = np.round(length / np.sqrt(_means(self.areas, sides)), 6)
         rank = np.empty(len(inner), dtype=int)
-        rank[np.lexsort((-np.arange(len(inner)), merit))] = np.arange(len(inner))
+        rank[::-1][np.argsort(merit[::-1], kind="stable")] = np.arange(len(inner))
         patch = np.arange(len(self.corners))
         free = np.ones(len(self.corners), dtype=bool)
         while len(sides):
@@ -125,7 +125,8 @@ class Triangles:
             free[merged.ravel()] = False
             left = free[sides].all(axis=1)
             sides, rank = sides[left], rank[left]
-        return np.unique(self._without_held_patches(patch, beside[inner]), return_inverse=True)[1]
+        patch = self._without_held_patches(patch, beside[inner])
+        return (np.cumsum(np.bincount(patch) > 0) - 1)[patch]
 
     def _without_held_patches(self, patch: np.ndarray, sides: np.ndarray) -> np.ndarray:
         """`patch`, with patches whose nodes all lie on walls joined to a neighbour: no unknown moves such nodes."""

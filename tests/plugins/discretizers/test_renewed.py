@@ -179,12 +179,7 @@ def test_triangles_bear_no_trace_of_how_they_were_found() -> None:
 # Lists.
 
 
-@pytest.mark.parametrize("few", [0, 10**9])
-def test_lists_hold_the_nearest_of_moving_appearing_and_vanishing_sources(
-    few: int, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """By the tree, and by comparing all distances."""
-    monkeypatch.setattr("nlsolve_discretizers.weights.lists.FEW", few)
+def test_lists_hold_the_nearest_of_moving_appearing_and_vanishing_sources() -> None:
     random = np.random.default_rng(4)
     sources, targets = random.random((200, 2)), random.random((150, 2))
     lists = Lists.of(sources, targets, 9, 6)
@@ -205,16 +200,15 @@ def test_lists_hold_the_nearest_of_moving_appearing_and_vanishing_sources(
 
 @pytest.fixture
 def asked(monkeypatch: pytest.MonkeyPatch) -> list[int]:
-    """How many targets the tree was asked about, each time, when it is asked even about few."""
+    """How many targets the tree was asked about, each time."""
     numbers: list[int] = []
     query = Lists.query
 
-    def counted(lists: Lists, count: int, which: Array) -> tuple[Array, Array]:
+    def counted(lists: Lists, count: int, which: Array, quick: bool = False) -> tuple[Array, Array]:
         numbers.append(len(which))
-        return query(lists, count, which)
+        return query(lists, count, which, quick)
 
     monkeypatch.setattr(Lists, "query", counted)
-    monkeypatch.setattr("nlsolve_discretizers.weights.lists.FEW", 0)
     return numbers
 
 
