@@ -1,25 +1,29 @@
-"""What building operators costs: against the number of nodes, one factorisation, and another library.
+"""What building operators costs: against the number of nodes, one factorisation, numpy alone, and other libraries.
 
     python benchmarks/operators.py [repeats]
 
 Prints what the operators of a cloud cost whose nodes have moved a little, each built alone and each from the one
-before; median seconds of B and S on graded rings of 2 000 to 100 000 nodes with the exponent of their growth, and the
-share of triangulation and neighbour search; on the 2015 paper's 1780 nodes the ratio to one factorisation; and, where
-the library `rbf` is installed (pip install treverhines-rbf), seconds of both for the same first-derivative weights:
-r³, degree 2 and 3, the same supports, targets between the same nodes.
+before, and the latter with numpy alone; the same for ∂/∂x and ∂/∂y at the stress points of such clouds beside
+pycompadre and treverhines-rbf, where these are installed, from as many neighbours with polynomials of the same degree;
+median seconds of B and S on graded rings of 2 000 to 100 000 nodes with the exponent of their growth, and the share of
+triangulation and neighbour search; and on the 2015 paper's 1780 nodes the ratio to one factorisation. What numba
+compiles is compiled, or loaded, before anything is timed.
 """
 
 from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import numpy as np
 from nlsolve_discretizers.collocation import GRADIENT, Collocation
+from nlsolve_discretizers.kernels.machine_code import numpy_alone
 from nlsolve_discretizers.weights.assembly import Gradient
+from nlsolve_discretizers.weights.neighbours import Neighbours
 from nlsolve_discretizers.weights.triangles import Triangles
+from other_libraries import PACKAGES, Weights, installed
 from steps_cost import median_seconds
 from threadpoolctl import threadpool_limits
 
@@ -28,11 +32,7 @@ from nlsolve.flow.momentum import Flow
 from nlsolve.flow.motion.moving_nodes import MovingNodes
 from nlsolve.plugin import NodeMotion, Operators
 
-try:
-    from rbf.pde.fd import weight_matrix
-except ImportError:
-    weight_matrix = None
-
+ABSENT = "numba is not installed (pip install 'nlsolve[numba]')"
 KINDS = ("mls", "rbf", "delaunay")
 PAPER = {"kind": "rings"}
 SCALES = (1.05, 0.6, 0.35, 0.22, 0.143)  # of all spacings: 2 000 to 100 000 nodes
@@ -71,26 +71,31 @@ def stirred(case: Any, increments: int) -> Iterator[nlsolve.Cloud]:
 
 def of_moved_clouds(increments: int) -> None:
     """Print median seconds of the operators of the clouds of a march, each built alone and each from the one before."""
-    print("\nmoved clouds           nodes      alone   from the one before   ratio   the very same")
+    print(f"compiled by {setup('mls', PAPER).discretizer.compiled_by() or 'nothing: ' + ABSENT}\n")
+    print("moved clouds     nodes       alone   from the one before   ratio   by numpy alone   ratio   the very same")
     for nodes in (PAPER, {"kind": "graded-rings", "first": 0.08, "growth": 0.1, "spacing": 0.12}):
         for kind in KINDS:
             case = setup(kind, nodes)
             discretizer = case.discretizer.for_law(case.law, case.scene.reference_rate)
-            before, seconds, same = None, [], 0
-            for cloud in stirred(case, increments):
-                began = time.process_time()
+            clouds = stirred(case, increments)
+            cloud = next(clouds)
+            before = plain = discretizer.operators(cloud, True)
+            seconds, same = [], 0
+            for cloud in clouds:
+                begun = time.process_time()
                 alone = discretizer.operators(cloud, True)
                 built = time.process_time()
-                if before is not None:
-                    before = discretizer.renewed(before, cloud)
-                    seconds.append((built - began, time.process_time() - built))
-                    pairs = zip(_matrices(before), _matrices(alone), strict=True)
-                    same += all((one != other).nnz == 0 for one, other in pairs)
-                before = before or alone
-            anew, renewed = np.median(seconds, axis=0)
+                before = discretizer.renewed(before, cloud)
+                renewed = time.process_time()
+                with numpy_alone():
+                    plain = discretizer.renewed(plain, cloud)
+                seconds.append((built - begun, renewed - built, time.process_time() - renewed))
+                pairs = zip(_matrices(before), _matrices(alone), strict=True)
+                same += all((one != other).nnz == 0 for one, other in pairs)
+            anew, renewed, by_numpy = np.median(seconds, axis=0)
             print(
-                f"  {kind:9s} {len(cloud.nodes):16d} {1e3 * anew:7.1f} ms {1e3 * renewed:18.1f} ms "
-                f"{anew / renewed:7.2f} {same:8d} of {increments}",
+                f"  {kind:9s} {len(cloud.nodes):10d} {1e3 * anew:8.1f} ms {1e3 * renewed:18.1f} ms "
+                f"{anew / renewed:7.2f} {1e3 * by_numpy:13.1f} ms {by_numpy / renewed:7.2f} {same:8d} of {increments}",
                 flush=True,
             )
 
@@ -134,45 +139,61 @@ def against_factorization(repeats: int) -> None:
             print(f"  {kind:9s}{form:14s} {1e3 * build:12.1f} ms {1e3 * factorize:12.1f} ms {build / factorize:7.2f}")
 
 
-def derivatives(discretizer: Collocation, nodes: np.ndarray, points: np.ndarray) -> Any:
+def against_other_libraries(increments: int) -> None:
+    """Print median seconds of ∂/∂x and ∂/∂y at the same points of moved clouds, from as many neighbours each: ours from
+    the cloud before, and those of other libraries with their ratios to ours.
+    """
+    libraries = installed()
+    for name in sorted(PACKAGES.keys() - libraries):
+        print(f"\n{name} is not installed, which would be compared with (pip install {name}).")
+    if not libraries:
+        return
+    heading = "".join(f"{name:>21s}  ratio" for name in ("numpy alone", *libraries))
+    for kind, method in (("mls", "moving least squares"), ("rbf", "r³")):
+        print(f"\nfirst derivatives, our {method:24s}       ours{heading}")
+        for nodes in (PAPER, {"kind": "graded-rings", "first": 0.08, "growth": 0.1, "spacing": 0.12}):
+            for degree, support in ((2, 12), (3, 20)):
+                case = setup(kind, nodes, degree=degree, support=support, balanced=False)
+                seconds = np.median(list(_of_derivatives(case, libraries, increments)), axis=0)
+                cells = "".join(f"{1e3 * value:18.1f} ms {value / seconds[0]:6.2f}" for value in seconds[1:])
+                points = len(case.discretizer.operators(case.scene.cloud(case.law), False).strain.points)
+                print(
+                    f"  {points:6d} points, degree {degree}, {support} nodes {1e3 * seconds[0]:14.1f} ms{cells}",
+                    flush=True,
+                )
+
+
+def _of_derivatives(case: Any, libraries: dict[str, Weights], increments: int) -> Iterator[list[float]]:
+    """Seconds for each cloud of a march: ours, ours by numpy alone, and of each library."""
+    discretizer, clouds = case.discretizer, stirred(case, increments)
+    known = [discretizer.operators(next(clouds), False).neighbours] * 2
+    for cloud in clouds:
+        known = [near.renewed(cloud, lambda triangles: triangles.inner_edges) for near in known]
+        nodes, points = cloud.nodes, known[0].triangles.midpoints()
+        ours = seconds_of(lambda: derivatives(discretizer, nodes, points, known[0]))
+        with numpy_alone():
+            plain = seconds_of(lambda: derivatives(discretizer, nodes, points, known[1]))
+        given = nodes, points, discretizer.degree, discretizer.support
+        yield [ours, plain, *(seconds_of(lambda: weights(*given)) for weights in libraries.values())]
+
+
+def derivatives(discretizer: Collocation, nodes: np.ndarray, points: np.ndarray, near: Neighbours) -> Any:
     """∂/∂x and ∂/∂y at `points` (T, 2) from `nodes` (N, 2) [mm], sparse (T, N) each."""
-    supports, (dx, dy) = discretizer.weights(nodes, points, "value", GRADIENT)
+    supports, (dx, dy) = discretizer.weights(nodes, points, "strain", GRADIENT, near=near)
     return Gradient(supports.index, dx, dy).matrices(len(nodes))
 
 
-def against_another_library(repeats: int) -> None:
-    """Print the time of ∂/∂x and ∂/∂y at the same points from the same nodes, as sparse matrices of either library."""
-    if weight_matrix is None:
-        print("\nThe library rbf is not installed (pip install treverhines-rbf): nothing to compare with.")
-        return
-    print("\nfirst derivatives, r³           ours       rbf, one call   rbf, two calls   ratios")
-    for nodes in (PAPER, {"kind": "graded-rings", "first": 0.04, "growth": 0.05, "spacing": 0.1}):
-        for degree, support in ((2, 12), (3, 20)):
-            case = setup("rbf", nodes, degree=degree, support=support, balanced=False)
-            cloud, ours = case.scene.cloud(case.law), case.discretizer
-            points = ours.operators(cloud, False).strain.points
-            options = {"n": support, "phi": "phs3", "order": degree}
-            seconds = [
-                median_seconds(work, repeats)
-                for work in (
-                    lambda o=ours, c=cloud, p=points: derivatives(o, c.nodes, p),
-                    lambda c=cloud, p=points, k=options: weight_matrix(
-                        p, c.nodes, diffs=[[1, 0], [0, 1]], sum_terms=False, **k
-                    ),
-                    lambda c=cloud, p=points, k=options: [
-                        weight_matrix(p, c.nodes, diffs=d, **k) for d in ([1, 0], [0, 1])
-                    ],
-                )
-            ]
-            cells = "".join(f"{1e3 * value:13.1f} ms" for value in seconds)
-            ratios = "".join(f"{value / seconds[0]:8.2f}" for value in seconds[1:])
-            print(f"  {len(points):6d} points, degree {degree}{cells}{ratios}")
+def seconds_of(work: Callable[[], object]) -> float:
+    """Processor time of a piece of work [s]."""
+    begun = time.process_time()
+    work()
+    return time.process_time() - begun
 
 
 if __name__ == "__main__":
     count = int(sys.argv[1]) if len(sys.argv) > 1 else 5
     with threadpool_limits(limits=1):
         of_moved_clouds(5 * count)
-        against_another_library(3 * count)
+        against_other_libraries(3 * count)
         against_factorization(3 * count)
         growth(max(1, count // 3))
