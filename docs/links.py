@@ -31,6 +31,17 @@ def broken(path: Path) -> list[str]:
     return [link for link in links if "://" not in link and not leads(link, path)]
 
 
+WEB = re.compile(r"https://[a-z0-9-]+(\.[a-z0-9-]+)+(/[\w.,~%+@!$&'*;=:/?#-]*)?")
+"""What a link to another site looks like: https, a host with a domain, and no letter that would have to be quoted."""
+
+
+def malformed(path: Path) -> list[str]:
+    """What of a page begins like a link to another site, in brackets or bare, and is not written like one."""
+    text = re.sub(r"`[^`\n]*`", "", CODE.sub("", path.read_text(encoding="utf-8")))
+    found = re.findall(r"\]\(<?([a-zA-Z]+:[^)\s]*)", text) + re.findall(r"(?<![(\w])(https?:[^\s)>\]\"]*)", text)
+    return [link for link in found if not WEB.fullmatch(link.rstrip(".,;>"))]
+
+
 def leads(link: str, path: Path) -> bool:
     """Whether what a link of the page at `path` names is there."""
     file, _, anchor = link.partition("#")

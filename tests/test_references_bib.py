@@ -85,3 +85,21 @@ def test_an_entry_says_who_what_and_when(key):
     assert set(fields) >= {"author", "title", "year"}
     assert key.endswith(fields["year"])
     assert all(value.count("{") == value.count("}") for value in fields.values())
+
+
+DOI = re.compile(r"10\.\d{4,9}/[^\s\"<>{}]+")
+"""A digital object identifier (ISO 26324): the bare name, without the address that resolves it."""
+
+
+@pytest.mark.parametrize("key", [key for key, fields in entries().items() if {"doi", "url"} & fields.keys()])
+def test_an_entry_leads_somewhere_by_a_well_formed_name(key):
+    fields = entries()[key]
+    assert DOI.fullmatch(fields.get("doi", "10.1000/182"))
+    assert fields.get("url", "https://").startswith("https://")
+
+
+@pytest.mark.parametrize(
+    "text", ["https://doi.org/10.1000/182", "10.1000", "10.1/2", "doi:10.1000/182", "10.1000/1 82"]
+)
+def test_what_is_no_identifier(text):
+    assert not DOI.fullmatch(text)

@@ -9,7 +9,7 @@ from pathlib import Path
 import gallery
 import pytest
 from docstrings import restructured
-from links import broken, slug
+from links import broken, malformed, slug
 from pages import PAGES
 
 import nlsolve
@@ -105,6 +105,20 @@ def test_links_to_nothing_are_found(tmp_path):
     page.write_text(f"# A `b`\n\n{links}\n\n# A b\n", encoding="utf-8")
     other.write_text("# Other\n\n```sh\n# x\n```\n", encoding="utf-8")
     assert broken(page) == ["#c", "other.md#x", "no.md#x"]
+
+
+@pytest.mark.parametrize("path", [*PAGES, ROOT / "CHANGELOG.md"], ids=lambda path: path.relative_to(ROOT).as_posix())
+def test_links_to_other_sites_are_well_formed(path):
+    """Whether they lead somewhere is not asked: tests need no network."""
+    assert malformed(path) == []
+
+
+def test_malformed_links_are_found(tmp_path):
+    page = tmp_path / "page.md"
+    wrong = ["http://a.org/", "https:/a.org", "https://a", "ftp://a.org", "https://a.org/<x>", "htps://a.org"]
+    links = "".join(f"[x]({link}) " for link in wrong)
+    page.write_text(f"{links}[x](https://a-b.org/c/d.html#e) see https://a.org. And http://b.org `http://c`\n", "utf-8")
+    assert sorted(malformed(page)) == sorted([*wrong, "http://b.org"])
 
 
 @pytest.mark.slow
