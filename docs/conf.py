@@ -18,7 +18,8 @@ html_css_files = ["wide.css"]
 html_copy_source = False
 html_show_copyright = False
 
-extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinxcontrib.mermaid", "docstrings", "gallery", "links"]
+extensions = ["myst_nb", "sphinx.ext.autodoc", "docstrings", "flowchart", "gallery", "links", "mathematics"]
+html_math_renderer = "mathml"
 exclude_patterns: list[str] = []
 
 smartquotes = False  # --retry stays --retry

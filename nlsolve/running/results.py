@@ -114,8 +114,7 @@ class Results:
 
     def plot(self, kind: str, **keys: Any) -> plotting.Figure:
         """A figure of these results: one that the study declares, by its name, or a new one of a kind, with the keys
-        of a `[[figure]]`: `results.plot("field", value="rate")`. `savefig` writes it; a notebook that has imported
-        matplotlib.pyplot shows it.
+        of a `[[figure]]`: `results.plot("field", value="rate")`. `savefig` writes it, a notebook shows it.
 
         Raises StudyError for a kind or a key that is none, and for a figure that these results cannot fill.
         """

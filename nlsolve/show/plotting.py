@@ -29,6 +29,8 @@ if TYPE_CHECKING:
     )
     from matplotlib.tri import Triangulation
 
+    from nlsolve.show.figures.paper.picture import Picture
+
 _HOME = {
     "colormaps": "matplotlib",
     "rc_context": "matplotlib",
@@ -56,6 +58,7 @@ _HOME = {
     "MaxNLocator": "matplotlib.ticker",
     "NullLocator": "matplotlib.ticker",
     "Triangulation": "matplotlib.tri",
+    "Picture": "nlsolve.show.figures.paper.picture",
 }
 
 __all__ = [
@@ -75,6 +78,7 @@ __all__ = [
     "MaxNLocator",
     "NullLocator",
     "Patch",
+    "Picture",
     "PillowWriter",
     "Polygon",
     "Rectangle",

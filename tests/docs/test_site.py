@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -9,7 +10,10 @@ from pathlib import Path
 import gallery
 import pytest
 from docstrings import restructured
+from flowchart import drawn as drawn_chart
+from flowchart import laid_out
 from links import broken, malformed, slug
+from mathematics import mathml
 from pages import PAGES
 
 import nlsolve
@@ -33,7 +37,8 @@ def build(pages: dict[str, str], folder: Path) -> subprocess.CompletedProcess[st
 def test_what_is_not_there_fails_the_build(tmp_path):
     pages = {
         "index.md": "# Site\n\n```{toctree}\none\n```\n",
-        "one.md": "# One\n\n[a](nothing.md), [b](index.md#nowhere), [c](#here-neither)\n\n```{nothing}\n```\n",
+        "one.md": "# One\n\n[a](nothing.md), [b](index.md#nowhere), [c](#here-neither)\n\n```{nothing}\n```\n"
+        "\n```mermaid\npie\n```\n",
         "lost.md": "# Not in the list of pages\n",
         "names.md": "---\norphan: true\n---\n# Names\n\n```{eval-rst}\n.. autofunction:: nlsolve.dissolve\n```\n",
     }
@@ -45,6 +50,7 @@ def test_what_is_not_there_fails_the_build(tmp_path):
         "here-neither",
         "Unknown directive",
         "lost.md",
+        "only 'flowchart TD' with lines 'upper --> lower' can be drawn, not 'pie'",
         "failed to import 'dissolve'",
     ):
         assert fault in told.stderr, fault
@@ -53,11 +59,66 @@ def test_what_is_not_there_fails_the_build(tmp_path):
 def test_what_is_there_passes(tmp_path):
     pages = {
         "index.md": "# Site\n\n[a](#a-heading), [one](one.md#one-two)\n\n## A heading\n\n```{toctree}\none\n```\n",
-        "one.md": "# One two\n\n```{eval-rst}\n.. autofunction:: nlsolve.solve\n```\n\n```mermaid\nflowchart TD\n```\n",
+        "one.md": "# One two\n\n```{eval-rst}\n.. autofunction:: nlsolve.solve\n```\n\n"
+        "```mermaid\nflowchart TD\n    a --> b\n```\n\nWhere $a_{\\max}$ is, and\n\n$$R = 0$$\n",
     }
     told = build(pages, tmp_path)
     assert told.returncode == 0, told.stderr
-    assert "u_0, (U,); may be left out" in (tmp_path / "built" / "one.html").read_text("utf-8")
+    html = (tmp_path / "built" / "one.html").read_text("utf-8")
+    assert "u_0, (U,); may be left out" in html
+    assert re.findall(r"<text [^>]*>(\w+)</text>", html) == ["a", "b"]
+    assert "<msub><mi>a</mi>" in html
+    assert 'display="block"' in html
+    assert elsewhere(tmp_path / "built") == set()
+
+
+REQUEST = re.compile(
+    r"""<(?:script|img|iframe)\b[^>]*\bsrc="(https?:)?//[^"]*"|<link\b[^>]*\bhref="(https?:)?//[^"]*\""""
+)
+
+
+def elsewhere(site: Path) -> set[str]:
+    """What pages and styles of a site ask of other sites as they are opened."""
+    pages = {found[0] for page in site.rglob("*.html") for found in REQUEST.finditer(page.read_text(encoding="utf-8"))}
+    styles = (page.read_text(encoding="utf-8") for page in site.rglob("*.css"))
+    return pages | {
+        url for style in styles for url in re.findall(r"url\(\s*['\"]?(?:https?:)?//[^)]*\)|@import[^;]*//", style)
+    }
+
+
+def test_what_asks_other_sites_is_found(tmp_path):
+    page = '<script defer="defer" src="https://cdn.org/x.js"></script><img src="a.png"><a href="https://a.org">a</a>'
+    (tmp_path / "page.html").write_text(f'{page}<link rel="stylesheet" href="//fonts.org/f.css" />', "utf-8")
+    (tmp_path / "page.css").write_text("a { b: url('https://c.org/d.woff'); e: url(f.png) }", "utf-8")
+    assert len(elsewhere(tmp_path)) == 3
+
+
+def test_mathematics_that_cannot_be_set():
+    with pytest.raises(ValueError, match=r"\\nothing in '\\\\nothing x' cannot be set"):
+        mathml(r"\nothing x")
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("flowchart LR\na --> b", "not 'flowchart LR'"),
+        ("flowchart TD\na --> b\nb -.-> c", "not 'b -.-> c'"),
+        ("flowchart TD\na --> b\nb --> a", "in a circle"),
+        ("", "not ''"),
+    ],
+)
+def test_a_chart_that_cannot_be_drawn(text, said):
+    with pytest.raises(ValueError, match=said):
+        drawn_chart(text)
+
+
+def test_a_chart_has_its_boxes_in_rows_and_arrows_round_them():
+    across, ways = laid_out([("a", "b"), ("a", "c"), ("b", "d"), ("d", "e"), ("c", "e")])
+    assert {name: row for name, row in across if len(name) == 1} == {"a": 0, "b": 1, "c": 1, "d": 2, "e": 3}
+    assert (("c", 1), ("c e", 2), ("e", 3)) in ways
+    assert len({(row, x) for (_, row), x in across.items()}) == len(across) == 6
+    assert across["b", 1] == across["d", 2]
+    assert across["c", 1] == across["c e", 2]
 
 
 DOCSTRING = """\
@@ -126,6 +187,7 @@ def test_the_site_is_built_and_has_every_public_name(tmp_path):
     command = [sys.executable, "-m", "sphinx", "-q", "-W", "--keep-going", "-b", "html", CONFIGURATION, tmp_path]
     told = subprocess.run(command, capture_output=True, text=True, check=False)
     assert told.returncode == 0, told.stderr
+    assert elsewhere(tmp_path) == set()
     html = "".join(page.read_text(encoding="utf-8") for page in (tmp_path / "reference").glob("*.html"))
     for door in (nlsolve, nlsolve.plugin, nlsolve.testing):
         missing = {

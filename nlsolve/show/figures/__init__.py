@@ -115,7 +115,7 @@ def drawn(spec: BaseFigure, frames: Frames) -> tuple[plotting.Figure, pd.DataFra
         raise spec.refuse(f"font {spec.font!r} is not installed; there are {listing([*FONTS, *near])}")
     with plotting.rc_context(style_of(spec)):
         width = spec.wide(COLUMN)
-        figure = plotting.Figure(figsize=(width, 0.72 * width), layout="constrained")
+        figure = plotting.Picture(spec, figsize=(width, 0.72 * width), layout="constrained")
         told = spec.paint(figure, frames)
     return figure, told
 
