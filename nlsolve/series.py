@@ -182,8 +182,10 @@ class Series:
             return Series._by_rule(lambda j: self.coefficient(j) + other.coefficient(j), self, other)
         constant = _constant(other)
         shape = np.broadcast_shapes(self.shape, constant.shape)
+        if shape == self.shape:
+            return Series._by_rule(lambda j: self.coefficient(j) if j else self.coefficient(0) + constant, self)
         return Series._by_rule(
-            lambda j: self.coefficient(j) + constant if j == 0 else np.broadcast_to(self.coefficient(j), shape), self
+            lambda j: np.broadcast_to(self.coefficient(j), shape) if j else self.coefficient(0) + constant, self
         )
 
     __radd__ = __add__

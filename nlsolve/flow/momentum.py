@@ -16,8 +16,8 @@ import numpy as np
 import scipy
 import scipy.sparse as sp
 
-from nlsolve.contracts.continuum.cloud import Cloud, node_major
-from nlsolve.contracts.continuum.discretizer import Discretizer, Operators
+from nlsolve.contracts.continuum.cloud import Cloud, Indices, node_major
+from nlsolve.contracts.continuum.discretizer import Discretizer, Operators, PointOperators
 from nlsolve.contracts.continuum.law import ConstitutiveLaw, Number, rate_squared, stress, tangent_moduli
 from nlsolve.contracts.problem import Expansion, NonlinearProblem
 from nlsolve.contracts.status import SolveError, Status
@@ -77,14 +77,10 @@ class Flow(NonlinearProblem):
         lifted = np.zeros(2 * len(cloud.nodes))
         lifted[node_major(cloud.boundary)] = boundary_velocity.ravel()
         self._lifted = lifted
-        self._strain = operators.strain.rate[:, self._free]
-        self._strain_boundary = operators.strain.rate @ lifted
+        self._inside = _Placing(self._free, len(lifted))
         self.drift = drift
-        if drift is not None:
-            self._strain_boundary = self._strain_boundary + drift.strain.ravel()
         self._force = operators.strain.force
-        self._gradient: Any = None
-        self._dilatation: Any = None
+        self._volumetric: PointOperators | None = None
         self._inertia: Any = None
         self._carried: Carried | None = None
         areas = self._areas = np.ones(len(self._free)) * (
@@ -95,12 +91,12 @@ class Flow(NonlinearProblem):
         self._pressure: Array | float = 0.0 if pressure is None else pressure
         volumetric = operators.volumetric
         if volumetric is not None and np.max(penalty_modulus) > 0.0:
+            self._volumetric = volumetric
             self._modulus = np.broadcast_to(penalty_modulus, len(volumetric.points))
-            self._gradient = -volumetric.force @ sp.diags_array(self._modulus)
-            self._dilatation = volumetric.rate[:, self._free]
-            constant += self._gradient @ (volumetric.rate @ lifted)
+            given = volumetric.rate @ lifted
             if drift is not None and drift.dilatation is not None:
-                constant += self._gradient @ drift.dilatation
+                given = given + drift.dilatation
+            constant -= volumetric.force @ (self._modulus * given)
             if pressure is not None:
                 constant += volumetric.force @ pressure
         if inertia is not None:
@@ -125,9 +121,10 @@ class Flow(NonlinearProblem):
         return _Expansion(path, self._balance(path), self)
 
     def _balance(self, u: Number) -> Number:
-        balance = self._constant - self._force @ stress(self.law, self.strain_rate(u)).reshape(-1)
-        if self._gradient is not None:
-            balance = balance + self._gradient @ (self._dilatation @ u)
+        placed = self._inside @ u
+        balance = self._constant - self._force @ stress(self.law, self._strain_rate(placed)).reshape(-1)
+        if self._volumetric is not None:
+            balance = balance - self._volumetric.force @ (self._modulus * (self._volumetric.rate @ placed))
         if self._inertia is not None:
             balance = balance + self._inertia * u
         if self._carried is not None:
@@ -136,7 +133,12 @@ class Flow(NonlinearProblem):
 
     def strain_rate(self, u: Number) -> Number:
         """ε̇ at the strain points, (3, M) ordered xx, yy, xy [1/s]."""
-        return (self._strain @ u + self._strain_boundary).reshape(3, -1)
+        return self._strain_rate(self._inside @ u)
+
+    def _strain_rate(self, placed: Number) -> Number:
+        """ε̇ of velocities (2N,) that are zero on the boundary, to which the prescribed ones are added."""
+        rate = (self.operators.strain.rate @ (placed + self._lifted)).reshape(3, -1)
+        return rate if self.drift is None else rate + self.drift.strain
 
     def jacobian(self, u: Array) -> Any:
         """J = W ρ (1/Δt + ∂(v·∇ v)/∂v) − S C B − S_θ λ B_θ with the pointwise moduli C (3, 3, M) of the law.
@@ -190,31 +192,43 @@ class Flow(NonlinearProblem):
     def _linearized(self, moduli: Array, carried: Any) -> Any:
         """W ρ/Δt + carried − S C B − S_θ λ B_θ with pointwise moduli C (3, 3, M)."""
         points = moduli.shape[2]
-        # C as a sparse matrix with three entries a row: row a M + m holds columns m, M + m, 2 M + m.
+        # −C as a sparse matrix with three entries a row: row a M + m holds columns m, M + m, 2 M + m.
         columns = np.arange(points)[None, :, None] + points * np.arange(3)[None, None, :]
         pointwise = sp.csr_array(
             (
-                np.ascontiguousarray(moduli.transpose(0, 2, 1)).ravel(),
+                -np.ascontiguousarray(moduli.transpose(0, 2, 1)).ravel(),
                 np.broadcast_to(columns, (3, points, 3)).ravel(),
                 np.arange(0, 9 * points + 1, 3),
             ),
             shape=(3 * points, 3 * points),
         )
-        parts = [-(self._force @ (pointwise @ self._strain)), self._without_stress, carried]
+        # S C has fewer entries than C B.
+        parts = [(self._force @ pointwise) @ self._strain, self._without_stress, carried]
         return reduce(add, (part for part in parts if part is not None))
+
+    @cached_property
+    def _strain(self) -> Any:
+        """B at the interior nodes, (3M, 2F)."""
+        return self.operators.strain.rate[:, self._free]
 
     @cached_property
     def _without_stress(self) -> Any:
         """W ρ/Δt − S_θ λ B_θ, the same for every u; None where neither is present."""
-        volumetric = None if self._gradient is None else self._gradient @ self._dilatation
         inertia = None if self._inertia is None else sp.diags_array(self._inertia)
-        return inertia if volumetric is None else volumetric if inertia is None else volumetric + inertia
+        if self._volumetric is None:
+            return inertia
+        assert self._modulus is not None
+        dilatation = sp.diags_array(-self._modulus) @ self._volumetric.rate[:, self._free]
+        volumetric = self._volumetric.force @ dilatation
+        return volumetric if inertia is None else volumetric + inertia
 
     def scale(self, u: Array) -> float:
-        """‖|S| |s| + |S_θ λ| |B_θ v| + W ρ |v/Δt + v·∇ v| + |constant|‖₂: the size of the forces that cancel in R."""
-        terms = abs(self._force) @ np.abs(stress(self.law, self.strain_rate(u))).ravel() + np.abs(self._constant)
-        if self._gradient is not None:
-            terms += abs(self._gradient) @ np.abs(self._dilatation @ u)
+        """‖|S| |s| + |S_θ| |λ B_θ v| + W ρ |v/Δt + v·∇ v| + |constant|‖₂: the size of the forces that cancel in R."""
+        placed = self._inside @ u
+        terms = _magnitude(self._force) @ np.abs(stress(self.law, self._strain_rate(placed))).ravel()
+        terms += np.abs(self._constant)
+        if self._volumetric is not None:
+            terms += _magnitude(self._volumetric.force) @ np.abs(self._modulus * (self._volumetric.rate @ placed))
         if self._inertia is not None:
             terms += self._inertia * np.abs(u)
         if self._carried is not None:
@@ -299,6 +313,21 @@ class Flow(NonlinearProblem):
         return None if rate is None or self._modulus is None else self._pressure - self._modulus * rate
 
 
+@dataclass(frozen=True)
+class _Placing:
+    """The matrix (size, U) that puts entry i of a vector at place free[i] of a longer one, which is zero elsewhere."""
+
+    free: Indices
+    size: int
+
+    def __matmul__(self, u: Array) -> Array:
+        if not isinstance(u, np.ndarray):  # a series asks for each of its coefficients
+            return NotImplemented
+        placed = np.zeros(self.size)
+        placed[self.free] = u
+        return placed
+
+
 class _Expansion(Expansion):
     """The expansion of a flow, whose law may have no series at a strain rate."""
 
@@ -317,6 +346,11 @@ class _Expansion(Expansion):
             return super().remainder(j)
         except NoSeriesHere as refusal:
             raise self._flow.without_series(self._path.coefficient(0), refusal) from refusal
+
+
+def _magnitude(matrix: Any) -> Any:
+    """|A|, with the same places as A."""
+    return sp.csr_array((np.abs(matrix.data), matrix.indices, matrix.indptr), shape=matrix.shape)
 
 
 def secant_moduli(law: ConstitutiveLaw, strain_rate: Array) -> Array:

@@ -7,6 +7,7 @@ from collections.abc import Iterable
 from nlsolve.plugin import Component, hookimpl
 from nlsolve_rules.energy import Energy
 from nlsolve_rules.full_steps import FullSteps
+from nlsolve_rules.goldstein import Goldstein
 from nlsolve_rules.least_residual import Backtracking, Cubic, NonMonotone
 from nlsolve_rules.operators import (
     Diagonal,
@@ -41,7 +42,7 @@ OPERATORS = (
     Mass,
 )
 PREDICTORS = (Previous, Polynomial)
-GLOBALIZATIONS = (FullSteps, Backtracking, Cubic, NonMonotone, Energy)
+GLOBALIZATIONS = (FullSteps, Backtracking, Cubic, Goldstein, NonMonotone, Energy)
 
 
 @hookimpl

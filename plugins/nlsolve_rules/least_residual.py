@@ -76,13 +76,13 @@ class LeastResidual:
         predicted_decrease: float = 1.0,
     ) -> tuple[float, np.ndarray]:
         """The first t with enough decrease, else the best of those tried; and R(u + t w), (U,)."""
-        size = self._size(problem, residual)
+        size = compared(problem, residual, self._measure)
         self._sizes.append(size)
         length, best_length, best_size, best = 1.0, 1.0, np.inf, residual
         tried: Trials = []
         for _ in range(self._trials + 1):
             trial = problem.residual(state + length * direction)
-            trial_size = self._size(problem, trial)
+            trial_size = compared(problem, trial, self._measure)
             if trial_size < best_size or not np.isfinite(best_size):
                 best_length, best_size, best = length, trial_size, trial
             if not size or trial_size <= (1.0 - SUFFICIENT_DECREASE * length * predicted_decrease) * max(self._sizes):
@@ -91,8 +91,10 @@ class LeastResidual:
             length = self._shorter(tried, predicted_decrease)
         return best_length, best
 
-    def _size(self, problem: NonlinearProblem, residual: np.ndarray) -> float:
-        return problem.size(residual) if self._measure == "equations" else norm(residual)
+
+def compared(problem: NonlinearProblem, residual: np.ndarray, measure: ComparedBy) -> float:
+    """‖R‖, as searches compare it."""
+    return problem.size(residual) if measure == "equations" else norm(residual)
 
 
 def halved(tried: Trials, predicted_decrease: float) -> float:

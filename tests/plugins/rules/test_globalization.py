@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from cases import near, run, spin_flow
 from fakes import Plugin
-from nlsolve_rules import Backtracking, Cubic, Energy, FullSteps, NonMonotone
+from nlsolve_rules import Backtracking, Cubic, Energy, FullSteps, Goldstein, NonMonotone
 from nlsolve_rules.least_residual import interpolated
 from nlsolve_rules.refresh import EveryIteration, Never
 from nlsolve_solvers import Anderson, Broyden, Newton
@@ -32,7 +32,7 @@ from nlsolve.solving.work.ledger import Ledger
 from nlsolve.testing import check_globalization
 from nlsolve.testing.toy_problem import DenseLU, ToyProblem
 
-KINDS: tuple[Globalization, ...] = (FullSteps(), Backtracking(), NonMonotone(), Cubic(), Energy())
+KINDS: tuple[Globalization, ...] = (FullSteps(), Backtracking(), NonMonotone(), Cubic(), Goldstein(), Energy())
 ONE = np.ones(1)
 
 
@@ -110,7 +110,41 @@ def test_a_cubic_without_a_least_point_takes_the_shortest_length() -> None:
     assert interpolated([(1.0, 1.0), (0.5, 1e6)], 1.0) == pytest.approx(0.05)
 
 
-@pytest.mark.parametrize("globalization", [Backtracking(), Cubic(), NonMonotone(), Energy()], ids=lambda g: g.kind)
+def test_goldsteins_bounds_cut_a_step_that_hardly_gains() -> None:
+    """‖R‖² ≤ 1 − 2 c t: at t = 1, c = 0.2, ‖R‖ ≤ 0.77. The parabola through 1 and 0.81 = 0.9² has its least point at
+    1/1.81.
+    """
+    assert taken(Goldstein(), 0.7) == (1.0, 0.7, [1.0])
+    length, _, asked = taken(Goldstein(), 0.9, 0.6)
+    assert asked == pytest.approx([1.0, 0.5])
+    assert length == 0.5
+    assert taken(Goldstein(fraction=0.05), 0.9)[0] == 1.0
+
+
+def test_goldsteins_bounds_lengthen_a_step_that_gains_all_it_can() -> None:
+    """‖R‖² ≥ 1 − 2 (1 − c) t: after t = 1 has failed and 0.1 has gained more than 0.16, t is bisected between them."""
+    length, size, asked = taken(Goldstein(), 1e3, 0.9, 0.5)
+    assert asked == pytest.approx([1.0, 0.1, 0.55])
+    assert (length, size) == (pytest.approx(0.55), 0.5)
+    asked = taken(Goldstein(), 1e3, 0.9, 2.0, 0.7)[2]
+    assert asked == pytest.approx([1.0, 0.1, 0.55, 0.325])
+
+
+def test_goldsteins_search_takes_the_best_length_where_none_will_do() -> None:
+    assert taken(Goldstein(trials=2), 3.0, 1.5, 2.0)[:2] == (pytest.approx(0.1), 1.5)
+    assert taken(Goldstein(trials=1), np.nan, 2.0)[1] == 2.0
+
+
+@pytest.mark.parametrize("size", [0.0, 1.0])
+def test_goldsteins_search_of_a_solved_or_inexact_step_is_a_full_one(size: float) -> None:
+    problem = Scripted(0.9)
+    search = Goldstein().search(problem)
+    assert search.length(problem, 0.0 * ONE, size * ONE, ONE, 0.2)[0] == 1.0
+
+
+@pytest.mark.parametrize(
+    "globalization", [Backtracking(), Cubic(), Goldstein(), NonMonotone(), Energy()], ids=lambda g: g.kind
+)
 def test_newton_is_led_home_from_far_away_where_full_steps_are_not(globalization: Globalization) -> None:
     """F = arctan, whose full steps grow from |u| > 1.39."""
 
@@ -268,7 +302,7 @@ def test_a_mistake_in_a_study_is_told_with_its_place(value: Any, sentence: str) 
 
 def test_nested_kinds_are_listed_among_the_plugins() -> None:
     rows = {row.kind: row for row in load_registry().plugins() if row.noun == "globalization"}
-    assert set(rows) == {"none", "backtracking", "cubic", "non-monotone", "energy"}
+    assert set(rows) == {"none", "backtracking", "cubic", "goldstein", "non-monotone", "energy"}
     assert [parameter.name for parameter in rows["non-monotone"].parameters] == ["trials", "measure", "memory"]
 
 
