@@ -21,7 +21,7 @@ from nlsolve.contracts.rules.refresh import RefreshRule, TangentHistory
 from nlsolve.contracts.scene import Entry, Misfit, Preparation, Scene, Section, Simulation, SingleSolve, Solve, Workload
 from nlsolve.contracts.status import SolveError, Status
 from nlsolve.flow.scene import FlowScene
-from nlsolve.registry.hookspecs import hookimpl
+from nlsolve.registry.installed.hookspecs import hookimpl
 from nlsolve.registry.nested import AnyDiscretizer, AnyForm, AnyRange, Globalized
 from nlsolve.series import NoSeries, NoSeriesHere, Series, as_column
 from nlsolve.solving.anderson_mixing import Mixing

@@ -16,7 +16,10 @@ import pytest
 from fakes import Plugin
 
 from nlsolve.contracts.scene import Scene
-from nlsolve.registry.registry import CONTRACTS, FIRST_PARTY, Registry, installed_plugins, names_of
+from nlsolve.registry.classes import CONTRACTS
+from nlsolve.registry.installed.entries import installed_plugins, names_of
+from nlsolve.registry.offers import FIRST_PARTY
+from nlsolve.registry.registry import Registry
 from nlsolve.study.case import COMMON, Composer, sections_of
 from nlsolve.study.keys.schema import study_schema
 from nlsolve.study.study import Frame

@@ -5,8 +5,9 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 
+from nlsolve.registry.installed.entries import installed_plugins, names_of
 from nlsolve.registry.problems import StudyError, did_you_mean
-from nlsolve.registry.registry import DISABLE, installed_plugins, names_of
+from nlsolve.registry.registry import DISABLE
 
 
 def disable(names: Sequence[str]) -> None:

@@ -11,11 +11,13 @@ from pathlib import Path
 from types import ModuleType
 
 from nlsolve.contracts.component import Component
-from nlsolve.registry import hookspecs
-from nlsolve.registry.contract_version import unserved
-from nlsolve.registry.probing import fault_of_file, module_of_file, undisturbed
+from nlsolve.registry.classes import CONTRACTS
+from nlsolve.registry.installed import hookspecs
+from nlsolve.registry.installed.contract_version import unserved
+from nlsolve.registry.installed.probing import fault_of_file, module_of_file, undisturbed
 from nlsolve.registry.problems import StudyError
-from nlsolve.registry.registry import CONTRACTS, Registry, sentence_of
+from nlsolve.registry.registry import Registry
+from nlsolve.registry.rows import sentence_of
 
 DIGEST_LETTERS = 8
 

@@ -11,8 +11,9 @@ from pydantic import BaseModel, ValidationError
 
 from nlsolve.contracts.component import Component
 from nlsolve.contracts.status import InputError
+from nlsolve.registry.classes import CONTRACTS
 from nlsolve.registry.component_tables import ComponentTable
-from nlsolve.registry.registry import CONTRACTS, registry_in_use
+from nlsolve.registry.registry import registry_in_use
 from nlsolve.registry.toml_lines import Place, nearest_place
 
 LONGEST_VALUE = 60

@@ -7,65 +7,30 @@ several packages offer is the first-party one; without that, a study asks for on
 
 from __future__ import annotations
 
-import inspect
 import os
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from contextvars import ContextVar
 from copy import copy
-from dataclasses import dataclass
 from difflib import get_close_matches
 from functools import cache
-from importlib.metadata import EntryPoint, entry_points
+from importlib.metadata import EntryPoint
 from pathlib import Path
-from typing import Annotated, Any, Union, get_args
+from typing import Annotated, Any, Union
 
 import pluggy
 from pydantic import PlainValidator, SerializeAsAny
-from pydantic.fields import FieldInfo
-from pydantic_core import PydanticCustomError, to_jsonable_python
+from pydantic_core import PydanticCustomError
 
 from nlsolve.contracts.component import Component
-from nlsolve.contracts.continuum.discretizer import Discretizer
-from nlsolve.contracts.continuum.law import ConstitutiveLaw
-from nlsolve.contracts.linear_solver import LinearSolver
-from nlsolve.contracts.nonlinear_solver import NonlinearSolver
-from nlsolve.contracts.rules.globalization import Globalization
-from nlsolve.contracts.rules.homotopy_form import HomotopyForm
-from nlsolve.contracts.rules.operator import IterationOperator
-from nlsolve.contracts.rules.predictor import Predictor
-from nlsolve.contracts.rules.range_rule import RangeRule
-from nlsolve.contracts.rules.refresh import RefreshRule
-from nlsolve.contracts.scene import Scene
-from nlsolve.registry import hookspecs
+from nlsolve.registry.classes import CONTRACTS, QUALIFIED, check_properties, checked
 from nlsolve.registry.component_tables import ComponentTable, own_class
-from nlsolve.registry.contract_version import text_of, unserved
-from nlsolve.registry.probing import faults_of, undisturbed
-
-CONTRACTS: dict[str, type[Component]] = {
-    contract.noun: contract
-    for contract in (
-        Scene,
-        ConstitutiveLaw,
-        Discretizer,
-        LinearSolver,
-        NonlinearSolver,
-        RefreshRule,
-        IterationOperator,
-        Predictor,
-        Globalization,
-        RangeRule,
-        HomotopyForm,
-    )
-}
-"""The contracts whose classes a plugin may offer, by noun, in the order of a study file."""
-
-
-FIRST_PARTY = "nlsolve"
-"""The package whose kinds are meant where a study asks for one that other packages offer too."""
-
-QUALIFIED = ":"
-"""Stands between a package and a kind of it: `my-package:newton`."""
+from nlsolve.registry.installed import hookspecs
+from nlsolve.registry.installed.contract_version import text_of, unserved
+from nlsolve.registry.installed.entries import installed_plugins, is_own, names_of, source_of
+from nlsolve.registry.installed.probing import faults_of, undisturbed
+from nlsolve.registry.offers import Offers
+from nlsolve.registry.rows import PluginRow, meaning_of, parameters_of, sentence_of
 
 DISABLE = "NLSOLVE_DISABLE_PLUGINS"
 """Environment variable with the names of plugins, or packages of plugins, not to be imported: `first,second`."""
@@ -76,56 +41,14 @@ RENAMED_KINDS = {("scene", "system"): "published"}
 """Kinds of older study files, by noun, and what they are called now."""
 
 
-@dataclass(frozen=True)
-class Parameter:
-    """One field of a component, as `nlsolve plugins` prints it."""
-
-    name: str
-    type: str
-    default: Any
-    description: str
-
-
-@dataclass(frozen=True)
-class PluginRow:
-    """One row of `nlsolve plugins`: an offered component class, or a plugin that failed.
-
-    source : distribution, version and module that it comes from.
-    failure : why the plugin or the kind cannot be used; None when it can.
-    meaning : the first paragraph of its class's docstring.
-    """
-
-    noun: str
-    kind: str
-    source: str
-    parameters: tuple[Parameter, ...] = ()
-    failure: str | None = None
-    meaning: str = ""
-
-
-@dataclass(frozen=True)
-class _Offer:
-    """provider : the package, or the stem of the file, that offers the class."""
-
-    cls: type[Component]
-    source: str
-    provider: str
-
-    @property
-    def name(self) -> str:
-        """The qualified kind."""
-        return f"{self.provider}{QUALIFIED}{self.cls.kind_name()}"
-
-
-class Registry:
+class Registry(Offers):
     """Component classes by noun and kind, and the plugins that failed, with the reason."""
 
     def __init__(self) -> None:
+        super().__init__()
         self._manager = pluggy.PluginManager(hookspecs.PROJECT)
         self._manager.add_hookspecs(hookspecs)
-        self._offers: dict[tuple[str, str], list[_Offer]] = {}
         self._failures: list[PluginRow] = []
-        self._usable: dict[str, dict[str, type[Component]]] = {}
         self._disabled: list[PluginRow] = []
         self.files: tuple[Path, ...] = ()
 
@@ -138,7 +61,7 @@ class Registry:
         registry = cls()
         entries = installed_plugins()
         wanted = [entry for entry in entries if names_of(entry).isdisjoint(disabled)]
-        faults = faults_of([entry for entry in wanted if not _is_own(entry)])
+        faults = faults_of([entry for entry in wanted if not is_own(entry)])
         for entry in entries:
             if entry not in wanted:
                 registry._disabled.append(PluginRow("", "", source_of(entry), failure=DISABLED))
@@ -154,7 +77,7 @@ class Registry:
         source = source_of(entry)
         try:
             with undisturbed():
-                reason = "" if _is_own(entry) else unserved(text_of(entry))
+                reason = "" if is_own(entry) else unserved(text_of(entry))
                 plugin = None if reason else entry.load()
         except (Exception, SystemExit) as error:  # a stranger's import may raise anything; the rest must still work
             self._fail(source, f"the plugin {entry.name!r} cannot be imported: {sentence_of(error)}")
@@ -176,23 +99,13 @@ class Registry:
             return
         self.offer(offered, source)
 
-    def offer(self, classes: Iterable[type[Component]], source: str) -> None:
-        """Take up component classes. Raises TypeError for a class that no study can ask for."""
-        for cls in map(_checked, classes):
-            offer = _Offer(cls, source, source.partition(" ")[0])
-            others = self._offers.setdefault((cls.noun, cls.kind_name()), [])
-            if offer not in others:
-                others.append(offer)
-        self._usable.clear()
-
     def with_(self, classes: Iterable[type[Component]], source: str, file: Path | None = None) -> Registry:
         """A registry that has these classes as well, of a file or of none; `files` are all such files.
 
         Raises TypeError for a class that no study can ask for.
         """
         wider = copy(self)
-        wider._offers = {name: list(offers) for name, offers in self._offers.items()}
-        wider._usable = {}
+        wider._set_apart()
         wider.files = self.files if file is None else (*self.files, file)
         wider.offer(classes, source)
         return wider
@@ -215,7 +128,7 @@ class Registry:
                     f"it has no function {hookspecs.nlsolve_components.__name__} marked with @hookimpl "
                     "that returns component classes"
                 )
-            return [_checked(cls) for answer in answers for cls in answer]
+            return [checked(cls) for answer in answers for cls in answer]
         except Exception:
             if self._manager.is_registered(plugin):
                 self._manager.unregister(plugin)
@@ -223,60 +136,6 @@ class Registry:
 
     def _fail(self, source: str, reason: str) -> None:
         self._failures.append(PluginRow("", "", source, failure=reason))
-
-    def classes(self, noun: str) -> Mapping[str, type[Component]]:
-        """The usable classes of one noun, by kind."""
-        if noun not in self._usable:
-            kinds = sorted(kind for offered_noun, kind in self._offers if offered_noun == noun)
-            chosen = {kind: self._chosen(noun, kind) for kind in kinds}
-            self._usable[noun] = {
-                kind: offers[0].cls
-                for kind, offers in chosen.items()
-                if len(offers) == 1 and offers[0].cls.absent is None
-            }
-        return self._usable[noun]
-
-    def offered(self, noun: str, absent_too: bool = False) -> dict[str, type[Component]]:
-        """The classes of one noun by the kind that asks for each, qualified where the kind alone means another class.
-
-        absent_too : whether classes whose libraries are not installed are among them.
-        """
-        found = {}
-        for row_noun, kind in sorted(self._offers):
-            for offer in self._offers[row_noun, kind] if row_noun == noun else ():
-                name = kind if self._chosen(noun, kind) == [offer] else offer.name
-                if self._chosen(noun, name) == [offer] and (absent_too or offer.cls.absent is None):
-                    found[name] = offer.cls
-        return found
-
-    def qualified(self, noun: str, kind: str) -> list[str]:
-        """The qualified kind of the class that an unqualified kind means; of a qualified one there is no other."""
-        return [offer.name for offer in self._chosen(noun, kind)] if QUALIFIED not in kind else []
-
-    def class_called(self, noun: str, kind: str) -> type[Component] | None:
-        """The usable class of a kind, qualified or not; None when there is none."""
-        if QUALIFIED not in kind:
-            return self.classes(noun).get(kind)
-        offers = self._chosen(noun, kind)
-        return offers[0].cls if len(offers) == 1 and offers[0].cls.absent is None else None
-
-    def kind_of(self, component: Component) -> str | None:
-        """The kind by which a study asks for a component's own class, qualified where the kind alone means another
-        class; None when no plugin offers the class."""
-        cls, kind = type(component), component.kind_name()
-        if self.classes(component.noun).get(kind) is cls:
-            return kind
-        return next((offer.name for offer in self._offers.get((component.noun, kind), []) if offer.cls is cls), None)
-
-    def _chosen(self, noun: str, kind: str) -> list[_Offer]:
-        """The offers that a kind stands for: those of the package that it names, or else the first-party ones among
-        several."""
-        provider, colon, bare = kind.rpartition(QUALIFIED)
-        offers = self._offers.get((noun, bare), [])
-        if colon:
-            return [offer for offer in offers if offer.provider == provider]
-        own = [offer for offer in offers if offer.provider == FIRST_PARTY]
-        return own if own and len(offers) > 1 else offers
 
     def complaint(self, noun: str, kind: object) -> str | None:
         """Why this noun and kind have no usable class, in one sentence; None when they have one."""
@@ -335,7 +194,7 @@ class Registry:
             raise PydanticCustomError("contract_wrong", message, told)
         try:
             cls.kind_name()
-            _check_properties(cls)
+            check_properties(cls)
         except TypeError as error:
             raise PydanticCustomError("kind_undeclared", "{reason}", {"reason": str(error)}) from error
 
@@ -413,82 +272,9 @@ def _installed(disabled: frozenset[str]) -> Registry:
     return Registry.installed(disabled)
 
 
-def installed_plugins() -> list[EntryPoint]:
-    """The entry points of all installed plugins, in the order of their names."""
-    return sorted(entry_points(group=hookspecs.PROJECT), key=lambda entry: (entry.name, entry.value))
-
-
-def names_of(entry: EntryPoint) -> set[str]:
-    """The names by which a plugin is disabled: its own, and that of its package."""
-    return {entry.name} | ({entry.dist.name} if entry.dist else set())
-
-
-def source_of(entry: EntryPoint) -> str:
-    """Package, version and module of a plugin."""
-    return f"{entry.dist.name} {entry.dist.version} ({entry.value})" if entry.dist else entry.value
-
-
 _IN_USE: ContextVar[Registry | None] = ContextVar("registry in use", default=None)
 
 
 def registry_in_use() -> Registry:
     """The registry of the study that is being built; elsewhere that of the installed plugins."""
     return _IN_USE.get() or load_registry()
-
-
-def _is_own(entry: EntryPoint) -> bool:
-    """Whether a plugin ships with nlsolve."""
-    return entry.dist is not None and entry.dist.name == hookspecs.PROJECT
-
-
-def _checked(cls: Any) -> type[Component]:
-    """`cls` when it is a concrete component class of a contract with a literal kind. Raises TypeError otherwise."""
-    contracts = tuple(CONTRACTS.values())
-    if not (isinstance(cls, type) and issubclass(cls, Component) and issubclass(cls, contracts)):
-        raise TypeError(f"{cls!r} is not a subclass of one of {', '.join(c.__name__ for c in contracts)}")
-    if inspect.isabstract(cls):
-        missing = ", ".join(sorted(cls.__abstractmethods__))
-        raise TypeError(f"{cls.__name__} leaves methods of its contract out: {missing}")
-    kind = cls.kind_name()
-    names = get_args(cls.model_fields["kind"].annotation)
-    if names != (kind,):
-        raise TypeError(f'{cls.__name__} must declare its name: kind: Literal["name"] = "name"')
-    if QUALIFIED in kind:
-        raise TypeError(f"{cls.__name__} has the kind {kind!r}: a kind has no {QUALIFIED!r}, which packages end with")
-    _check_properties(cls)
-    return cls
-
-
-def _check_properties(cls: type[Component]) -> None:
-    """Raises TypeError where the contract has a property and `cls` a method, or the other way round: whoever reads the
-    one would get a function, and whoever calls the other would call a value.
-    """
-    bases = [base for base in cls.__mro__ if issubclass(base, Component)]
-    for name, promised in ((name, thing) for base in bases for name, thing in vars(base).items()):
-        given = inspect.getattr_static(cls, name, None)
-        if isinstance(promised, property) and inspect.isfunction(given):
-            raise TypeError(f"{cls.__name__}.{name} is a method, and should be a property: write @property above it")
-        if inspect.isfunction(promised) and isinstance(given, property):
-            raise TypeError(f"{cls.__name__}.{name} is a property, and should be a method: leave @property out")
-
-
-def meaning_of(cls: type[Component]) -> str:
-    """The first paragraph of a class's own docstring, in one line; empty when it has none."""
-    return " ".join(inspect.cleandoc(cls.__doc__ or "").partition("\n\n")[0].split())
-
-
-def parameters_of(cls: type[Component]) -> tuple[Parameter, ...]:
-    """The fields of a class of components, without its kind."""
-    return tuple(_parameter(name, info) for name, info in cls.model_fields.items() if name != "kind")
-
-
-def _parameter(name: str, info: FieldInfo) -> Parameter:
-    default = None if info.is_required() else to_jsonable_python(info.get_default(call_default_factory=True))
-    annotation = info.annotation
-    words = annotation.__name__ if isinstance(annotation, type) else str(annotation).replace("typing.", "")
-    return Parameter(name, words, "required" if info.is_required() else default, info.description or "")
-
-
-def sentence_of(error: BaseException) -> str:
-    """Exception type and the first line of its text."""
-    return f"{type(error).__name__}: {str(error).strip()}".splitlines()[0]

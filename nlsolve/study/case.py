@@ -19,9 +19,11 @@ from nlsolve.contracts.recording import IterateRecording
 from nlsolve.contracts.rules.operator import IterationOperator
 from nlsolve.contracts.rules.refresh import RefreshRule
 from nlsolve.contracts.scene import Misfit, Scene, Section
+from nlsolve.registry.classes import CONTRACTS
 from nlsolve.registry.component_tables import ComponentTable, class_name
 from nlsolve.registry.problems import ABSENT, Problem, problems_in, unknown
-from nlsolve.registry.registry import CONTRACTS, PluginRow, Registry, meaning_of, parameters_of
+from nlsolve.registry.registry import Registry
+from nlsolve.registry.rows import PluginRow, meaning_of, parameters_of
 from nlsolve.results.parameters import names_settings
 from nlsolve.solving.stopping import Budget, StoppingTest
 from nlsolve.study.known_parts import KnownPart, KnownParts, keys_of

@@ -14,7 +14,7 @@ from typer.testing import CliRunner
 
 from nlsolve.cli.app import app
 from nlsolve.cli.plugins.scaffold import CONTRACTS, files_of
-from nlsolve.registry.registry import CONTRACTS as NOUNS
+from nlsolve.registry.classes import CONTRACTS as NOUNS
 from nlsolve.registry.registry import Registry
 
 LONGEST = {"law": 15, "solver": 40}

@@ -23,8 +23,11 @@ from nlsolve.cli.app import app
 from nlsolve.contracts.component import Component
 from nlsolve.contracts.status import Status
 from nlsolve.flow.validity import LIMITS
-from nlsolve.registry import hookspecs
-from nlsolve.registry.registry import CONTRACTS, FIRST_PARTY, Registry, installed_plugins, names_of
+from nlsolve.registry.classes import CONTRACTS
+from nlsolve.registry.installed import hookspecs
+from nlsolve.registry.installed.entries import installed_plugins, names_of
+from nlsolve.registry.offers import FIRST_PARTY
+from nlsolve.registry.registry import Registry
 from nlsolve.results.columns import DIAGNOSTICS, FRAMES, RENAMED, Column
 
 ROOT = Path(__file__).parents[2]

@@ -9,10 +9,11 @@ from pathlib import Path
 import pytest
 from fakes import Newton, registry_of
 
-from nlsolve.registry import probing
+from nlsolve.registry.installed import probing
+from nlsolve.registry.installed.entries import installed_plugins
 from nlsolve.registry.plugin_files import load_file, with_files
 from nlsolve.registry.problems import StudyError
-from nlsolve.registry.registry import DISABLE, Registry, installed_plugins, load_registry
+from nlsolve.registry.registry import DISABLE, Registry, load_registry
 
 HALF = '''\
 from __future__ import annotations

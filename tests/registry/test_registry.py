@@ -12,7 +12,8 @@ from fakes import COMPONENTS, Homotopy, Honey, Newton, Plugin, registry_of
 from pydantic import TypeAdapter, ValidationError
 
 from nlsolve.plugin import NonlinearSolver, hookimpl
-from nlsolve.registry.registry import CONTRACTS, Registry, load_registry, registry_in_use
+from nlsolve.registry.classes import CONTRACTS
+from nlsolve.registry.registry import Registry, load_registry, registry_in_use
 
 
 class OtherNewton(Newton):
@@ -292,7 +293,7 @@ def test_entry_points_are_loaded_one_at_a_time(tmp_path, monkeypatch):
     monkeypatch.setattr(sys, "path", [str(tmp_path), *sys.path])
     ours = [e for e in importlib.metadata.entry_points(group="nlsolve") if e.dist and e.dist.name == "strangers"]
     assert len(ours) == 2
-    monkeypatch.setattr("nlsolve.registry.registry.entry_points", lambda group: ours)
+    monkeypatch.setattr("nlsolve.registry.installed.entries.entry_points", lambda group: ours)
     registry = Registry.installed()
     assert list(registry.classes("solver")) == ["newton"]
     good, bad = registry.plugins()

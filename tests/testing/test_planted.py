@@ -12,7 +12,10 @@ from planted_flows import DISCRETIZERS, LAWS, SCENES, SIMULATIONS, SYSTEMS
 from planted_solvers import LINEAR, RULES, SOLVERS
 
 from nlsolve.contracts.component import Component
-from nlsolve.registry.registry import CONTRACTS, FIRST_PARTY, Registry, installed_plugins, names_of
+from nlsolve.registry.classes import CONTRACTS
+from nlsolve.registry.installed.entries import installed_plugins, names_of
+from nlsolve.registry.offers import FIRST_PARTY
+from nlsolve.registry.registry import Registry
 from nlsolve.testing.kit.subjects import contract_of, verdicts_of
 from nlsolve.testing.kit.verdicts import promise, verdicts
 from nlsolve.testing.promises import require

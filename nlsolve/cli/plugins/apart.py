@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from nlsolve.cli.plugins.checking import FILE, Checked, broken, checked
-from nlsolve.registry.probing import IMPORT_SECONDS, environment_of_faults, how_it_ended
+from nlsolve.registry.installed.probing import IMPORT_SECONDS, environment_of_faults, how_it_ended
 from nlsolve.registry.problems import StudyError
 from nlsolve.registry.registry import Registry
 from nlsolve.testing.kit.verdicts import SECONDS

@@ -13,9 +13,10 @@ from pydantic import ValidationError
 
 from nlsolve.contracts.component import Component
 from nlsolve.contracts.status import InputError
+from nlsolve.registry.classes import CONTRACTS
 from nlsolve.registry.plugin_files import with_files
 from nlsolve.registry.problems import StudyError, did_you_mean
-from nlsolve.registry.registry import CONTRACTS, Registry, load_registry
+from nlsolve.registry.registry import Registry, load_registry
 from nlsolve.study.sweeps import parse_assignments
 from nlsolve.testing.kit.subjects import contract_of, verdicts_of
 from nlsolve.testing.kit.verdicts import WHOLE, Verdict

@@ -15,9 +15,11 @@ from rich.table import Table
 from nlsolve.cli.endings import ending
 from nlsolve.cli.options import Disabled, Json, PluginFiles, registry_of
 from nlsolve.cli.printing import folded, stdout
-from nlsolve.registry.contract_version import CONTRACT_VERSION
+from nlsolve.registry.classes import CONTRACTS, QUALIFIED
+from nlsolve.registry.installed.contract_version import CONTRACT_VERSION
+from nlsolve.registry.offers import FIRST_PARTY
 from nlsolve.registry.problems import StudyError, did_you_mean
-from nlsolve.registry.registry import CONTRACTS, FIRST_PARTY, QUALIFIED, PluginRow
+from nlsolve.registry.rows import PluginRow
 from nlsolve.study.case import section_rows
 
 WITH_KINDS = "Sections of a study, and the kinds that are installed; `nlsolve plugins solver newton` tells of one:"

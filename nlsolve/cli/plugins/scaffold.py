@@ -10,7 +10,7 @@ from importlib.metadata import version
 from importlib.util import find_spec
 from pathlib import Path
 
-from nlsolve.registry.contract_version import CONTRACT_VERSION, STATED
+from nlsolve.registry.installed.contract_version import CONTRACT_VERSION, STATED
 from nlsolve.registry.problems import StudyError
 
 TEMPLATES = Path(__file__).parent / "templates"

@@ -10,7 +10,7 @@ from types import FrameType
 from typing import Any
 
 from nlsolve.contracts.component import Component
-from nlsolve.registry.registry import CONTRACTS
+from nlsolve.registry.classes import CONTRACTS
 
 Frame = tuple[str, int]
 """File and line."""

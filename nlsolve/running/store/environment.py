@@ -15,7 +15,7 @@ from pathlib import Path
 
 from threadpoolctl import threadpool_info
 
-from nlsolve.registry.hookspecs import PROJECT
+from nlsolve.registry.installed.hookspecs import PROJECT
 from nlsolve.running.store.sources import LETTERS, fingerprint, numerics
 
 LIBRARIES = (PROJECT, "numpy", "scipy", "pandas", "pydantic")

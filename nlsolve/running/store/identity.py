@@ -12,7 +12,7 @@ from functools import cache, cached_property
 from pathlib import Path
 from typing import Any
 
-from nlsolve.registry.hookspecs import PROJECT
+from nlsolve.registry.installed.hookspecs import PROJECT
 from nlsolve.running.store.sources import fingerprint, sources_of
 from nlsolve.study.case import Case
 from nlsolve.study.known_parts import KnownPart, classes_of

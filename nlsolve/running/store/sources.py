@@ -23,7 +23,7 @@ from importlib.metadata import entry_points
 from pathlib import Path
 from types import CodeType, FunctionType, ModuleType
 
-from nlsolve.registry.hookspecs import PROJECT
+from nlsolve.registry.installed.hookspecs import PROJECT
 
 NUMERICS = ("series.py", "algebra", "contracts", "flow", "solving", "results/verdicts.py")
 """What of nlsolve computes numbers: files, and folders with all their files."""

@@ -9,8 +9,9 @@ from pydantic import BaseModel
 from pydantic.json_schema import GenerateJsonSchema, models_json_schema
 
 from nlsolve.contracts.scene import Scene, Section
+from nlsolve.registry.classes import CONTRACTS
 from nlsolve.registry.nested import BY_NAME, CONTRACT
-from nlsolve.registry.registry import CONTRACTS, Registry
+from nlsolve.registry.registry import Registry
 from nlsolve.study.case import Composer
 from nlsolve.study.study import Frame
 

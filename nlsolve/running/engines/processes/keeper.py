@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 
 from nlsolve.contracts.status import InputError, Status
-from nlsolve.registry.probing import how_it_ended
+from nlsolve.registry.installed.probing import how_it_ended
 from nlsolve.results.frames import Part
 from nlsolve.running.engines.execution import part_without_record
 from nlsolve.running.engines.places import frames_of_dump, place

@@ -16,7 +16,7 @@ from typing import Any
 
 import psutil
 
-from nlsolve.registry.probing import environment_of_faults
+from nlsolve.registry.installed.probing import environment_of_faults
 
 BOOT = (
     "import json, sys; argument = json.loads(sys.argv.pop()); sys.path[:] = argument['path']; "

@@ -12,8 +12,8 @@ from pathlib import Path
 
 import pytest
 
-from nlsolve.registry import probing
-from nlsolve.registry.probing import KNOWN_FAULTS, environment_of_faults, faults_of, undisturbed
+from nlsolve.registry.installed import probing
+from nlsolve.registry.installed.probing import KNOWN_FAULTS, environment_of_faults, faults_of, undisturbed
 from nlsolve.registry.registry import Registry
 
 SOUND = """\
@@ -63,7 +63,7 @@ def planted(tmp_path, monkeypatch) -> list[EntryPoint]:
 
 
 def test_each_fault_is_a_row_and_the_others_work(planted, monkeypatch, capfd):
-    monkeypatch.setattr("nlsolve.registry.registry.entry_points", lambda group: planted)
+    monkeypatch.setattr("nlsolve.registry.installed.entries.entry_points", lambda group: planted)
     folder = Path.cwd()
     registry = Registry.installed()
     assert set(registry.classes("solver")) == {"first", "still"}

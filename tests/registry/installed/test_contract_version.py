@@ -8,7 +8,7 @@ from types import ModuleType
 
 import pytest
 
-from nlsolve.registry.contract_version import CONTRACT_VERSION, text_of, unserved
+from nlsolve.registry.installed.contract_version import CONTRACT_VERSION, text_of, unserved
 from nlsolve.registry.plugin_files import load_file
 from nlsolve.registry.problems import StudyError
 from nlsolve.registry.registry import Registry

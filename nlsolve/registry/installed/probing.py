@@ -36,7 +36,7 @@ CHUNK = 2**16
 
 PROGRAM = (
     "import json, sys; argument = json.loads(sys.argv.pop()); sys.path[:] = argument['path']; "
-    "from nlsolve.registry.probing import import_all; import_all(argument['entries'], argument['report'])"
+    "from nlsolve.registry.installed.probing import import_all; import_all(argument['entries'], argument['report'])"
 )
 
 FILE = "file"

@@ -12,7 +12,7 @@ from types import ModuleType
 import pluggy
 import pytest
 
-from nlsolve.registry import hookspecs
+from nlsolve.registry.installed import hookspecs
 from nlsolve.registry.registry import Registry
 from nlsolve.testing import check_law
 

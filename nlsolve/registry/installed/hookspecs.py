@@ -5,7 +5,7 @@ A plugin is a module, found by its entry point in the group `nlsolve`. In the py
     [project.entry-points.nlsolve]
     honey = "honey"
 
-The module may state the version of the plugin contract that it was written for (`nlsolve.registry.contract_version`).
+The module may state the version of the plugin contract that it was written for (see `contract_version`).
 """
 
 from __future__ import annotations
