@@ -134,8 +134,10 @@ class Run:
 
 
 def distance(scene: Rescaled, v: np.ndarray) -> float:
-    """max_j |u_j − root_j| over the size of root_j, for the root nearest to u = v/c (U,); infinite without one."""
-    if not np.isfinite(v).all():
+    """max_j |u_j − root_j| over the size of root_j, for the root nearest to u = v/c (U,); infinite without one, and
+    for a case that was stopped before it had a state.
+    """
+    if not (len(v) and np.isfinite(v).all()):
         return np.inf
     u, system = v / scene.powers()[1], scene.system
     start = np.abs(system.start())
