@@ -179,8 +179,8 @@ def _of_derivatives(case: Any, libraries: dict[str, Weights], increments: int) -
 
 def derivatives(discretizer: Collocation, nodes: np.ndarray, points: np.ndarray, near: Neighbours) -> Any:
     """∂/∂x and ∂/∂y at `points` (T, 2) from `nodes` (N, 2) [mm], sparse (T, N) each."""
-    supports, (dx, dy) = discretizer.weights(nodes, points, "strain", GRADIENT, near=near)
-    return Gradient(supports.index, dx, dy).matrices(len(nodes))
+    supports, both = discretizer.weights(nodes, points, "strain", GRADIENT, near=near)
+    return Gradient(supports.index, both).matrices(len(nodes))
 
 
 def seconds_of(work: Callable[[], object]) -> float:

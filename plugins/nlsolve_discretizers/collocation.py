@@ -11,11 +11,12 @@ import numpy as np
 from pydantic import Field
 
 from nlsolve.plugin import Cloud, Discretizer, Operators, PointOperators, SolveError
+from nlsolve_discretizers import kernels
 from nlsolve_discretizers.conservation import conserving
-from nlsolve_discretizers.kernels import ranking
 from nlsolve_discretizers.kernels.machine_code import compiler_name
 from nlsolve_discretizers.kernels.offsets import offsets
-from nlsolve_discretizers.weights.assembly import Gradient, sparse_rows
+from nlsolve_discretizers.kernels.rows import sparse_rows
+from nlsolve_discretizers.weights.assembly import Gradient
 from nlsolve_discretizers.weights.diagnostics import diagnosis
 from nlsolve_discretizers.weights.least_squares import Derivatives, monomials
 from nlsolve_discretizers.weights.lists import Lists
@@ -52,8 +53,9 @@ class Collocation(Discretizer):
     """How often a weak support is enlarged, by half each time, before it is refused."""
 
     def compiled_by(self) -> str | None:
-        """numba, where it is installed, for the ranks of neighbours."""
-        ranking.machine_code()
+        """numba, where it is installed, for ranks and offsets of neighbours and rows of matrices."""
+        for kernel in (kernels.offsets, kernels.quadrants, kernels.ranking, kernels.rows):
+            kernel.machine_code()
         return compiler_name()
 
     @abstractmethod
@@ -192,8 +194,8 @@ class Collocation(Discretizer):
 
     def values(self, sources: np.ndarray, targets: np.ndarray) -> Any:
         """Sparse (T, N) matrix of values."""
-        supports, (value,) = self.weights(sources, targets, "value", VALUE)
-        return sparse_rows([(supports.index, value)], (len(targets), len(sources)))
+        supports, value = self.weights(sources, targets, "value", VALUE)
+        return sparse_rows(supports.index, value, [[(0, 0, 1.0)]], 1, len(sources))
 
     def diagnostics(self, cloud: Cloud) -> list[dict[str, Any]]:
         """One row each for the strain, force and volume weights of a cloud."""
@@ -215,8 +217,8 @@ class Collocation(Discretizer):
         self, sources: np.ndarray, targets: np.ndarray, role: str, cloud: Cloud, near: Neighbours | None = None
     ) -> Gradient:
         """∂/∂x and ∂/∂y at the targets."""
-        supports, (dx, dy) = self.weights(sources, targets, role, GRADIENT, cloud, near)
-        return Gradient(supports.index, dx, dy)
+        supports, both = self.weights(sources, targets, role, GRADIENT, cloud, near)
+        return Gradient(supports.index, both)
 
 
 def _batches(counts: np.ndarray, targets: np.ndarray) -> Iterator[tuple[int, np.ndarray | slice]]:

@@ -58,8 +58,8 @@ def conserving(cloud: Cloud, points: np.ndarray, areas: np.ndarray, gradient: Gr
             weights = weights - np.einsum("mkl,ml->mk", change, multiplier[near])
         return weights
 
-    corrected = Gradient(near, balanced(gradient.dx), balanced(gradient.dy))
-    part = _distance(corrected, gradient) / _distance(gradient, Gradient(near, 0.0 * gradient.dx, 0.0 * gradient.dy))
+    corrected = Gradient(near, np.stack([balanced(weights) for weights in gradient.both]))
+    part = float(np.linalg.norm(corrected.both - gradient.both)) / float(np.linalg.norm(gradient.both))
     if not part <= LARGEST_CORRECTION:
         raise SolveError(
             Status.ILL_CONDITIONED,
@@ -67,10 +67,6 @@ def conserving(cloud: Cloud, points: np.ndarray, areas: np.ndarray, gradient: Gr
             f"{int(felt.sum(axis=1).min())} neighbours leave them no freedom; widen discretizer.support",
         )
     return corrected
-
-
-def _distance(one: Gradient, other: Gradient) -> float:
-    return float(np.hypot(np.linalg.norm(one.dx - other.dx), np.linalg.norm(one.dy - other.dy)))
 
 
 def _projector(offsets: np.ndarray, felt: np.ndarray) -> np.ndarray:

@@ -60,7 +60,7 @@ class LinearTriangles(Discretizer):
         gradient, centroids = _gradient(triangles), triangles.centroids()
         radius = np.linalg.norm(cloud.nodes[triangles.corners] - centroids[:, None], axis=2).max(axis=1)
         supports = Supports(triangles.corners, np.full(len(radius), 3), radius, radius)
-        row = diagnosis(cloud.nodes, centroids, supports, np.stack([gradient.dx, gradient.dy]), 1)
+        row = diagnosis(cloud.nodes, centroids, supports, gradient.both, 1)
         return [{"operator": "strain", **row, "grown": 0}]
 
 
@@ -77,4 +77,4 @@ def _operators(triangles: Triangles, volumetric: bool) -> Operators:
 
 def _gradient(triangles: Triangles) -> Gradient:
     hats = triangles.hat_gradients / triangles.areas[:, None, None]
-    return Gradient(triangles.corners, hats[..., 0], hats[..., 1])
+    return Gradient(triangles.corners, np.moveaxis(hats, 2, 0))

@@ -22,12 +22,13 @@ def each(begin: int, end: int) -> Any:
     return (slice(begin, end),)
 
 
-def compiled(function: Callable[..., Any], signature: str, *called: Callable[..., Any]) -> Callable[..., Any] | None:
-    """`function` as machine code for arguments of one signature; None where there is no compiler.
+def compiled(function: Callable[..., Any], arguments: str, *called: Callable[..., Any]) -> Callable[..., Any] | None:
+    """`function` as machine code; None where there is no compiler.
 
+    arguments : the kind (f, i, b) and the number of indices of each, e.g. "f2 i0"; arrays are only read.
     called : the functions that it calls, of its own file: when that changes all is compiled again.
     """
-    return _code(function, signature, called) if _allowed and compiler() is not None else None
+    return _code(function, arguments, called) if _allowed and compiler() is not None else None
 
 
 def compiler_name() -> str | None:
@@ -65,8 +66,15 @@ def compiler() -> Any:
 
 
 @cache
-def _code(function: Callable[..., Any], signature: str, called: tuple[Callable[..., Any], ...]) -> Callable[..., Any]:
+def _code(function: Callable[..., Any], arguments: str, called: tuple[Callable[..., Any], ...]) -> Callable[..., Any]:
     numba = compiler()
+    kinds = {"f": numba.float64, "i": numba.int64, "b": numba.boolean}
+
+    def declared(argument: str) -> Any:
+        kind, indices = kinds[argument[0]], int(argument[1])
+        return numba.types.Array(kind, indices, "A", readonly=True) if indices else kind
+
+    signature = tuple(map(declared, arguments.split()))
     for part in called:
         numba.extending.register_jitable(part)
     try:

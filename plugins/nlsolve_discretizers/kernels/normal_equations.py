@@ -38,7 +38,7 @@ def fitted(
 
 def machine_code() -> Callable[..., Any] | None:
     """`in_blocks`, compiled; None where there is no compiler."""
-    return compiled(in_blocks, "(f8[:,:], f8[:,:], f8[:,:], i8, i8[:,:])", place, eliminated, together)
+    return compiled(in_blocks, "f2 f2 f2 i0 i2", place, eliminated, together)
 
 
 def together(

@@ -17,7 +17,7 @@ def offsets(sources: np.ndarray, targets: np.ndarray, index: np.ndarray) -> np.n
 
 def machine_code() -> Callable[..., Any] | None:
     """`together`, compiled; None where there is no compiler."""
-    return compiled(together, "(f8[:,:], f8[:,:], i8[:,:])")
+    return compiled(together, "f2 f2 i2")
 
 
 def together(sources: np.ndarray, targets: np.ndarray, near: np.ndarray) -> np.ndarray:

@@ -23,7 +23,7 @@ def ranked(
 
 def machine_code() -> Callable[..., Any] | None:
     """`by_insertion`, compiled; None where there is no compiler."""
-    return compiled(by_insertion, "(f8[:,:], f8[:,:], i8[:,:], i8[:], i8[:])")
+    return compiled(by_insertion, "f2 f2 i2 i1 i1")
 
 
 def by_sorting(

@@ -12,6 +12,7 @@ import scipy
 
 from nlsolve.plugin import SolveError, Status
 from nlsolve_discretizers.kernels.offsets import offsets
+from nlsolve_discretizers.kernels.quadrants import quadrants, surrounded
 from nlsolve_discretizers.weights.lists import Lists
 
 REACH = 1.5  # times the distance of the farthest neighbour: a quadrant whose nearest source lies beyond is left empty
@@ -58,7 +59,7 @@ class Supports:
         plain = cls._of(distance, index, counts)
         if not balanced:
             return plain
-        lopsided = np.flatnonzero(~_surrounded(offsets(sources, targets, index[:, :largest]), counts))
+        lopsided = np.flatnonzero(~surrounded(sources, targets, index[:, :largest], counts))
         if not len(lopsided):
             return plain
         most = min(2 * largest, len(sources) - 1)
@@ -105,27 +106,12 @@ class Supports:
         return Supports(index, count, radius, farthest)
 
 
-def _quadrants(offsets: np.ndarray) -> list[np.ndarray]:
-    """Which of the offsets (2, …) lie in each closed quadrant, (…) each."""
-    (right, above), (left, below) = offsets >= 0, offsets <= 0
-    return [right & above, left & above, left & below, right & below]
-
-
-def _surrounded(offsets: np.ndarray, counts: np.ndarray) -> np.ndarray:
-    """Whether the first counts[t] of the offsets (2, k, T) serve every quadrant, (T,)."""
-    served = np.zeros((4, offsets.shape[2]), dtype=bool)
-    for k in range(offsets.shape[1]):  # row by row, which stays in the cache
-        for quadrant, inside in enumerate(_quadrants(offsets[:, k])):
-            served[quadrant] |= inside & (k < counts)
-    return np.logical_and.reduce(served)
-
-
 def _balanced(offsets: np.ndarray, distance: np.ndarray, counts: np.ndarray) -> np.ndarray:
     """Counts (T,) that include the nearest source of every quadrant, if within REACH, for offsets (2, most, T)."""
     row = np.arange(len(counts))
     rim = REACH * distance[row, counts - 1]
     needed = counts.copy()
-    for quadrant in _quadrants(offsets):
+    for quadrant in quadrants(offsets):
         first = quadrant.argmax(axis=0)
         reachable = quadrant[first, row] & (distance[row, first] <= rim)
         needed = np.where(reachable, np.maximum(needed, first + 1), needed)

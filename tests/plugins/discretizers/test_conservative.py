@@ -256,8 +256,8 @@ def test_a_node_that_no_point_feels_cannot_be_balanced() -> None:
     points, areas = triangles.diamonds()
     deaf = cloud.interior[40]
     others = np.delete(np.arange(len(cloud.nodes)), deaf)
-    supports, (dx, dy) = MovingLeastSquares().weights(cloud.nodes[others], points, "strain", GRADIENT)
-    gradient = Gradient(others[supports.index], dx, dy)
+    supports, both = MovingLeastSquares().weights(cloud.nodes[others], points, "strain", GRADIENT)
+    gradient = Gradient(others[supports.index], both)
     with pytest.raises(SolveError, match="cannot be made conservative on this cloud: widen the supports") as ending:
         conserving(cloud, points, areas, gradient)
     assert ending.value.status is Status.BAD_CLOUD

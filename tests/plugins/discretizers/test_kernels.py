@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 import pytest
 from clouds import CLOUDS, jittered_points
-from nlsolve_discretizers import LinearTriangles, MovingLeastSquares, RadialBasis
-from nlsolve_discretizers.kernels import machine_code, normal_equations, ranking
+from nlsolve_discretizers import LinearTriangles, MovingLeastSquares, RadialBasis, kernels
+from nlsolve_discretizers.kernels import machine_code, normal_equations, quadrants, ranking, rows
 from nlsolve_discretizers.kernels.machine_code import compiled, compiler_name, numpy_alone
 from nlsolve_discretizers.kernels.offsets import offsets
 from nlsolve_discretizers.weights.supports import Supports
@@ -109,6 +109,37 @@ def test_compiled_ranks_are_numpys() -> None:
         np.testing.assert_array_equal(one, other)
 
 
+@needs_numba
+@pytest.mark.parametrize("read_only", [False, True])
+def test_compiled_quadrants_are_numpys(read_only: bool) -> None:
+    """For neighbours on axes, at the target itself, and for ragged counts."""
+    random = np.random.default_rng(3)
+    sources, targets = random.integers(-3, 4, (60, 2)) + 0.0, random.integers(-3, 4, (50, 2)) + 0.0
+    given = sources, targets, random.integers(0, 60, (50, 9)), random.integers(1, 10, 50)
+    for array in given:
+        array.flags.writeable = not read_only
+    around = quadrants.surrounded(*given)
+    with numpy_alone():
+        np.testing.assert_array_equal(around, quadrants.surrounded(*given))
+    assert 0 < around.sum() < len(around)
+
+
+@needs_numba
+@pytest.mark.parametrize("of_target_together", [False, True])
+def test_compiled_rows_are_numpys(of_target_together: bool) -> None:
+    """Also of derivatives that are not one after the other in memory, with zeros to be left out."""
+    random = np.random.default_rng(4)
+    near, derivatives = random.integers(0, 30, (20, 7)), np.moveaxis(random.random((20, 7, 2)), 2, 0)
+    derivatives[:, random.random((20, 7)) < 0.3] = 0.0
+    terms = [[(0, 0, 1.0), (31, 1, 0.5)], [(5, 1, 2.0), (40, 0, -1.0)]]
+    matrix = rows.sparse_rows(near, derivatives, terms, 1, 80, of_target_together)
+    with numpy_alone():
+        other = rows.sparse_rows(near, derivatives, terms, 1, 80, of_target_together)
+    for part in ("data", "indices", "indptr"):
+        np.testing.assert_array_equal(getattr(matrix, part), getattr(other, part))
+    assert matrix.shape == other.shape == (40, 80)
+
+
 # Where there is no compiler, or no place for what it makes.
 
 
@@ -158,9 +189,9 @@ def test_where_nothing_can_be_kept_it_is_compiled_in_every_process(monkeypatch: 
             raise RuntimeError("cannot cache function: no locator available")
         return lambda function: function
 
-    numba = SimpleNamespace(njit=njit, extending=SimpleNamespace(register_jitable=lambda part: None), __version__="1")
+    numba = SimpleNamespace(njit=njit, float64="f8", int64="i8", boolean="b1")
     monkeypatch.setattr(machine_code, "compiler", lambda: numba)
-    assert compiled(ranking.by_insertion, "") is ranking.by_insertion
+    assert compiled(ranking.by_insertion, "f0 i0") is ranking.by_insertion
     assert asked == [True, False]
 
 
@@ -182,14 +213,15 @@ def told_by_a_process(code: str) -> str:
 
 @needs_numba
 def test_another_process_compiles_nothing() -> None:
-    normal_equations.machine_code()
-    ranking.machine_code()
+    for name in kernels.__all__:
+        getattr(kernels, name).machine_code()
     code = (
-        "from nlsolve_discretizers.kernels import normal_equations, ranking\n"
-        "for code in (normal_equations.machine_code(), ranking.machine_code()):\n"
-        "    print(sum(code.stats.cache_misses.values()), sum(code.stats.cache_hits.values()))"
+        "from nlsolve_discretizers import kernels\n"
+        "for name in kernels.__all__:\n"
+        "    stats = getattr(kernels, name).machine_code().stats\n"
+        "    print(sum(stats.cache_misses.values()), sum(stats.cache_hits.values()))"
     )
-    assert told_by_a_process(code).splitlines() == ["0 1", "0 1"]
+    assert told_by_a_process(code).splitlines() == ["0 1"] * len(kernels.__all__)
 
 
 def test_a_study_is_read_and_planned_without_the_compiler() -> None:
