@@ -13,7 +13,6 @@ from pydantic import Field
 from nlsolve.plugin import Cloud, Discretizer, Operators, PointOperators, SolveError
 from nlsolve_discretizers import kernels
 from nlsolve_discretizers.conservation import conserving
-from nlsolve_discretizers.kernels.machine_code import compiler_name
 from nlsolve_discretizers.kernels.offsets import offsets
 from nlsolve_discretizers.kernels.rows import sparse_rows
 from nlsolve_discretizers.weights.assembly import Gradient
@@ -53,10 +52,8 @@ class Collocation(Discretizer):
     """How often a weak support is enlarged, by half each time, before it is refused."""
 
     def compiled_by(self) -> str | None:
-        """numba, where it is installed, for ranks and offsets of neighbours and rows of matrices."""
-        for kernel in (kernels.offsets, kernels.quadrants, kernels.ranking, kernels.rows):
-            kernel.machine_code()
-        return compiler_name()
+        """numba, where it is installed."""
+        return kernels.loaded()
 
     @abstractmethod
     def neighbour_count(self, role: str) -> int | None:

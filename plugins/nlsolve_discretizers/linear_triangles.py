@@ -8,6 +8,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from nlsolve.plugin import Cloud, Discretizer, Operators, PointOperators
+from nlsolve_discretizers import kernels
 from nlsolve_discretizers.moving_least_squares import MovingLeastSquares
 from nlsolve_discretizers.weights.assembly import Gradient
 from nlsolve_discretizers.weights.diagnostics import diagnosis
@@ -25,6 +26,10 @@ class LinearTriangles(Discretizer):
     """
 
     kind: Literal["delaunay"] = "delaunay"
+
+    def compiled_by(self) -> str | None:
+        """numba, where it is installed, for the rows of B and for values at any points."""
+        return kernels.loaded()
 
     def operators(self, cloud: Cloud, volumetric: bool) -> Operators:
         """B, S and, when asked for, B_θ, S_θ, in conservative form."""

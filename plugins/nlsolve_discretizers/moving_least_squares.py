@@ -9,7 +9,6 @@ from pydantic import Field, model_validator
 
 from nlsolve.plugin import Cloud, SolveError, Status
 from nlsolve_discretizers.collocation import Collocation, least_count
-from nlsolve_discretizers.kernels import normal_equations
 from nlsolve_discretizers.weights.least_squares import Derivatives, fit
 from nlsolve_discretizers.weights.lists import Lists
 from nlsolve_discretizers.weights.supports import Supports
@@ -20,7 +19,7 @@ SMALLEST_PIVOT = 1e-8  # of R, relative to its column: below, the support does n
 class MovingLeastSquares(Collocation):
     """Polynomials fitted to the neighbours with weights that fall with distance (Lancaster & Salkauskas 1981).
 
-    Moved clouds take half the time with numba: pip install 'nlsolve[numba]'; the column `compiled_by` tells.
+    Operators of moved clouds take less time with numba: pip install 'nlsolve[numba]'; the column `compiled_by` tells.
     """
 
     kind: Literal["mls"] = "mls"
@@ -40,11 +39,6 @@ class MovingLeastSquares(Collocation):
                     f"{name} = {getattr(self, name)}: polynomials of degree {self.degree} need at least {least} points"
                 )
         return self
-
-    def compiled_by(self) -> str | None:
-        """numba, where it is installed, for the weights too."""
-        normal_equations.machine_code()
-        return super().compiled_by()
 
     def neighbour_count(self, role: str) -> int | None:
         """The counts of the roles, unless a radius is given; values have as many neighbours as strains."""
