@@ -1,16 +1,18 @@
 """What does a velocity within 1 %, 0.1 % and 0.01 % cost, and what by finite elements? The steady spin of two indices.
 
-    python benchmarks/equal_error.py [rounds] [largest seconds]
+    python benchmarks/equal_error.py [rounds] [largest seconds] [rest]
 
 Each method is run on its own clouds, graded to the layer at the tool and refined by a factor s. Ours: `delaunay` by
 Newton's method, and `mls` by newton-krylov preconditioned with triangles, without and with the estimate of the error.
-Theirs: Taylor-Hood elements (`taylor_hood.py`). All begin at n = 1 and pass the same indices, end each at a relative
-residual of 1e-8, take full steps that are halved until the residual falls, and factorise with PARDISO where it is
-installed. Seconds are of the processor, from the nodes on to the velocities, operators and assembly included; of each
-run the median of the rounds (default: 3), in which all take turns; what takes longer than 5 s is run once. A method's
-clouds end before a run that would take longer than `largest seconds` (default: 60). The error is ‖v − v_exact‖₂ over
-‖v_exact‖₂, of the nodes inside. Prints every run, then seconds at the errors asked for, interpolated between clouds
-in the logarithms, and their ratios to those of finite elements.
+Theirs: Taylor-Hood elements (`taylor_hood.py`). All begin at n = 1 and pass the same indices to the one asked for; with
+`rest` all begin with that one and V = 0 inside. All end at a relative residual of 1e-8, take full steps that are halved
+until the residual falls, and factorise with PARDISO where it is installed.
+
+Seconds are of the processor, from the nodes on to the velocities, operators and assembly included; of each run the
+median of the rounds (default: 3), in which all take turns; what takes longer than 5 s is run once. A method's clouds
+end before a run that would take longer than `largest seconds` (default: 60). The error is ‖v − v_exact‖₂/‖v_exact‖₂
+over the nodes inside. Prints every run, then seconds at the errors asked for, interpolated between clouds in the
+logarithms, and their ratios to those of finite elements.
 """
 
 from __future__ import annotations
@@ -54,7 +56,7 @@ Cost = tuple[int, float, float]
 """Velocities, relative error and seconds of one run."""
 
 
-def parts(method: str, index: float, s: float, estimated: bool) -> Any:
+def parts(method: str, index: float, s: float, estimated: bool, rest: bool = False) -> Any:
     """The components of the steady spin on the method's own grading, refined by s."""
     grading = GRADINGS[method]
     nodes = {"kind": "auto", **grading, "growth": grading["growth"] * s, "resolution": s, "spacing": s, "middle": s}
@@ -64,16 +66,16 @@ def parts(method: str, index: float, s: float, estimated: bool) -> Any:
         "law": {"kind": "power-law", "index": index, "regularization": 1e-3},
         "discretizer": {"kind": "delaunay" if method == "finite elements" else method},
         "solver": SOLVERS[method],
-        "start": {"solver": SOLVERS[method], "tolerance": TOLERANCE},
+        "start": {"solver": SOLVERS[method], "tolerance": TOLERANCE, **({"values": []} if rest else {})},
         "stop": {"tolerance": TOLERANCE},
     }
     case = nlsolve.Study.from_dict(study).cases[0].parts
     return case if estimated else case.model_copy(update={"error_estimator": None})
 
 
-def ours(method: str, index: float, s: float, estimated: bool) -> Cost:
+def ours(method: str, index: float, s: float, estimated: bool, rest: bool) -> Cost:
     """One case of nlsolve."""
-    case = parts(method, index, s, estimated)
+    case = parts(method, index, s, estimated, rest)
     begun = time.process_time()
     row = run_case(case).summary
     seconds = time.process_time() - begun
@@ -81,9 +83,9 @@ def ours(method: str, index: float, s: float, estimated: bool) -> Cost:
     return int(row["nodes"]), float(row["velocity_error_inside"]), seconds
 
 
-def theirs(index: float, s: float) -> Cost:
+def theirs(index: float, s: float, rest: bool) -> Cost:
     """The same by finite elements."""
-    case = parts("finite elements", index, s, False)
+    case = parts("finite elements", index, s, False, rest)
     laws = [stage.law for stage in case.start.stages(case.law)]
     begun = time.process_time()
     flow = TaylorHood(case.scene.cloud(case.law), SADDLE)
@@ -94,16 +96,16 @@ def theirs(index: float, s: float) -> Cost:
     return len(flow.points), float(error), seconds
 
 
-METHODS: Mapping[str, tuple[str, Callable[[float, float], Cost]]] = {
+METHODS: Mapping[str, tuple[str, Callable[[float, float, bool], Cost]]] = {
     "finite elements": ("finite elements", theirs),
-    "delaunay": ("delaunay", lambda index, s: ours("delaunay", index, s, False)),
-    "delaunay, estimated": ("delaunay", lambda index, s: ours("delaunay", index, s, True)),
-    "mls": ("mls", lambda index, s: ours("mls", index, s, False)),
-    "mls, estimated": ("mls", lambda index, s: ours("mls", index, s, True)),
+    "delaunay": ("delaunay", lambda index, s, rest: ours("delaunay", index, s, False, rest)),
+    "delaunay, estimated": ("delaunay", lambda index, s, rest: ours("delaunay", index, s, True, rest)),
+    "mls": ("mls", lambda index, s, rest: ours("mls", index, s, False, rest)),
+    "mls, estimated": ("mls", lambda index, s, rest: ours("mls", index, s, True, rest)),
 }
 
 
-def measured(index: float, rounds: int, largest: float) -> dict[str, list[Cost]]:
+def measured(index: float, rounds: int, largest: float, rest: bool) -> dict[str, list[Cost]]:
     """Median costs of each method on its clouds, coarsest first."""
     found: dict[str, list[Cost]] = {name: [] for name in METHODS}
     for level in range(max(map(len, REFINEMENTS.values()))):
@@ -116,7 +118,7 @@ def measured(index: float, rounds: int, largest: float) -> dict[str, list[Cost]]
         for _ in range(rounds):
             for name, (s, run) in going.items():
                 if not costs[name] or costs[name][0][2] < LONG:
-                    costs[name].append(run(index, s))
+                    costs[name].append(run(index, s, rest))
         for name, runs in costs.items():
             count, error, _ = runs[0]
             seconds = statistics.median(run[2] for run in runs)
@@ -139,12 +141,12 @@ def seconds_at(error: float, costs: list[Cost]) -> float:
     return float(min(candidates, default=np.nan))
 
 
-def main(rounds: int, largest: float) -> None:
+def main(rounds: int, largest: float, rest: bool) -> None:
     """Print both tables."""
     print("       n  method                   s  velocities       error   seconds")
     for _, run in METHODS.values():  # imports and memory are no work of a method
-        run(INDICES[0], REFINEMENTS["mls"][0])
-    tables = {index: measured(index, rounds, largest) for index in INDICES}
+        run(INDICES[0], REFINEMENTS["mls"][0], rest)
+    tables = {index: measured(index, rounds, largest, rest) for index in INDICES}
     print("\n       n  method                " + "".join(f"{100 * error:>10g} %    ratio" for error in ERRORS))
     for index, found in tables.items():
         base = [seconds_at(error, found["finite elements"]) for error in ERRORS]
@@ -154,6 +156,6 @@ def main(rounds: int, largest: float) -> None:
 
 
 if __name__ == "__main__":
-    given = [float(argument) for argument in sys.argv[1:]]
+    given = [float(argument) for argument in sys.argv[1:] if argument != "rest"]
     with threadpool_limits(limits=1):
-        main(int(given[0]) if given else 3, given[1] if len(given) > 1 else 60.0)
+        main(int(given[0]) if given else 3, given[1] if len(given) > 1 else 60.0, "rest" in sys.argv)
