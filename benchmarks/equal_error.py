@@ -9,7 +9,7 @@ Theirs: Taylor-Hood elements (`taylor_hood.py`). All begin at n = 1 and pass the
 until the residual falls, and factorise with PARDISO where it is installed.
 
 Seconds are of the processor, from the nodes on to the velocities, operators and assembly included; of each run the
-median of the rounds (default: 3), in which all take turns; what takes longer than 5 s is run once. A method's clouds
+median of the rounds (default: 3), in which all take turns; what takes longer than 2 s is run once. A method's clouds
 end before a run that would take longer than `largest seconds` (default: 60). The error is ‖v − v_exact‖₂/‖v_exact‖₂
 over the nodes inside. Prints every run, then seconds at the errors asked for, interpolated between clouds in the
 logarithms, and their ratios to those of finite elements.
@@ -33,7 +33,7 @@ from threadpoolctl import threadpool_limits
 import nlsolve
 from nlsolve.solving.simulate import run_case
 
-LONG, GROWTH = 5.0, 2.5  # seconds of a run that is not repeated, and of a finer cloud over those of one before
+LONG, GROWTH = 2.0, 3.0  # seconds of a run that is not repeated, and of a finer cloud over those of one before
 INDICES, ERRORS, TOLERANCE = (0.3, 0.1324), (1e-2, 1e-3, 1e-4), 1e-8
 SADDLE = SuperLU() if Pardiso.absent else Pardiso(symmetric="never")
 GRADINGS = {
@@ -43,9 +43,9 @@ GRADINGS = {
 }
 """At s = 1, the best of those tried for each: about ten gradings at n = 0.1324."""
 REFINEMENTS = {
-    "finite elements": (2.0, 1.4, 1.0, 0.7, 0.5, 0.35, 0.25),
-    "delaunay": (2.0, 1.4, 1.0, 0.7, 0.5, 0.35, 0.25, 0.17),
-    "mls": (1.4, 1.0, 0.7, 0.5, 0.35, 0.25, 0.17),
+    "finite elements": (2.0, 1.0, 0.5, 0.3),
+    "delaunay": (2.0, 1.2, 0.6, 0.35, 0.2),
+    "mls": (1.4, 0.8, 0.4, 0.25),
 }
 SOLVERS: dict[str, dict[str, Any]] = {
     "finite elements": {"kind": "newton"},
