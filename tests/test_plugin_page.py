@@ -15,10 +15,7 @@ from typing import Any
 from nlsolve.cli.plugins.checking import PAGE as NAMED
 from nlsolve.cli.plugins.scaffold import CONTRACTS, files_of
 from nlsolve.contracts.component import Component
-from nlsolve.contracts.scene import Scene
-from nlsolve.registry.registry import load_registry
 from nlsolve.testing.kit.subjects import CHECKS, contract_of, verdicts_of
-from nlsolve.testing.kit.verdicts import verdicts
 
 ROOT = Path(__file__).parent.parent
 PAGE = ROOT / NAMED
@@ -32,6 +29,7 @@ TITLES = {
     "discretizer": "Your first discretizer",
     "scene": "Your first scene",
     "system": "Your first system",
+    "pde": "Your first partial differential equation",
     "linear-solver": "Your first linear solver",
     "refresh": "Your first refresh rule",
     "operator": "Your first iteration operator",
@@ -42,13 +40,10 @@ TITLES = {
 }
 
 OWN_PROBLEM = """\
-## Scene
+A scene of its own, such as an equation that another library assembles, builds its `Simulation`. [Your own
+PDE](guides/own-pde.md) says how; an example with an exact solution is
+[examples/p_laplace_by_scikit_fem.py](../examples/p_laplace_by_scikit_fem.py).
 
-A scene of its own, such as a partial differential equation that another library assembles, builds its `Simulation`;
-the complete example is [examples/p_laplace_by_scikit_fem.py](../examples/p_laplace_by_scikit_fem.py).
-
-| promise | what is promised |
-| --- | --- |
 """
 
 
@@ -85,22 +80,14 @@ def text(page: str) -> str:
         plugin, study, component = scaffold_of(contract)
         lines = len([line for line in plugin.splitlines() if line])
         parts.append(
-            f"## {contract_of(type(component)).__name__}\n\n{TITLES[contract]}, in {lines} lines, as "
+            f"## {contract_of(type(component)).__name__}\n\n{OWN_PROBLEM if contract == 'pde' else ''}"
+            f"{TITLES[contract]}, in {lines} lines, as "
             f"`nlsolve new {contract} my-{contract}` writes it:\n\n"
             f"<!-- file: my_{contract.replace('-', '_')}.py -->\n```python\n{plugin}```\n\n"
             f"and the study that uses it:\n\n```toml\n{study}```\n\nWhat it is held to:\n\n"
             "| promise | what is promised |\n| --- | --- |\n" + "".join(promises(component))
         )
-    scene = load_registry().classes("scene")["bratu"](nodes=4)  # seen as a scene of its own
-    parts.append(OWN_PROBLEM + "".join(verdicts_of_simulation(scene)))
     return before + BEGIN + "\n".join(parts) + END + after
-
-
-def verdicts_of_simulation(scene: Component) -> Iterator[str]:
-    """The promises of a scene that is neither a flow nor a system, on one that is."""
-    for verdict in verdicts(lambda: CHECKS[Scene](scene)):
-        assert verdict.holds, verdict
-        yield f"| {verdict.name} | {verdict.meaning} |\n"
 
 
 def test_the_page_is_up_to_date() -> None:

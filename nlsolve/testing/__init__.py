@@ -24,7 +24,7 @@ from nlsolve.testing.rules import (
     check_range_rule,
     check_refresh_rule,
 )
-from nlsolve.testing.scenes import check_scene, check_system
+from nlsolve.testing.scenes import check_scene, check_simulation, check_system
 from nlsolve.testing.solvers import check_solver
 
 __all__ = [
@@ -40,6 +40,7 @@ __all__ = [
     "check_range_rule",
     "check_refresh_rule",
     "check_scene",
+    "check_simulation",
     "check_solver",
     "check_system",
     "toy_cloud",

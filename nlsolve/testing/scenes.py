@@ -1,7 +1,9 @@
-"""The checks of scenes: of a flow's cloud and boundary, and of a system's formula and roots."""
+"""The checks of scenes: a flow's cloud and boundary, a system's formula and roots, and what any scene builds."""
 
 from __future__ import annotations
 
+from contextlib import nullcontext
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -11,11 +13,14 @@ from nlsolve.algebra.system import System
 from nlsolve.contracts.continuum.geometry import Geometry
 from nlsolve.contracts.continuum.law import ConstitutiveLaw
 from nlsolve.contracts.continuum.terms import NodeMotion, Physics
+from nlsolve.contracts.recording import SystemStart
+from nlsolve.contracts.scene import Scene, Simulation
 from nlsolve.series import Array, Series
 from nlsolve.testing.kit.exact import check_exact
 from nlsolve.testing.kit.verdicts import promise
 from nlsolve.testing.problems import check_problem
 from nlsolve.testing.promises import norm, require, same, shaped
+from nlsolve.testing.toy_problem import DenseLU
 
 
 def check_scene(scene: Geometry, law: ConstitutiveLaw) -> None:
@@ -119,3 +124,20 @@ def _check_root(system: System, problem: FormulaProblem, root: Array, start: Arr
     if not system.singular:
         step = norm(np.linalg.solve(jacobian, exact.astype(float)))
         require(step <= 1e-12 * (norm(root) or 1.0), f"a Newton step moves the root {root} by {step:.1e}")
+
+
+def check_simulation(scene: Scene, parts: Any = None) -> None:
+    """Check that a scene builds its simulation, and that the problem of its sample has its Jacobian and series.
+
+    parts : the components of its sections; without them it gets a linear solver, and the start of a system.
+    """
+    with promise("simulation", "the scene builds a Simulation"):
+        given = SimpleNamespace(scene=scene, linear=DenseLU(), start=SystemStart()) if parts is None else parts
+        simulation = scene.simulation(given, lambda kind: nullcontext())
+        told = f"simulation() gave a {type(simulation).__name__}, not a Simulation"
+        require(isinstance(simulation, Simulation), told)
+    with promise("sample", "its sample is a problem and a state (U,) of it"):
+        problem, state = simulation.sample()
+        residual = problem.residual(state)
+        require(residual.shape == state.shape, f"R of shape {residual.shape} at a state of shape {state.shape}")
+    check_problem(problem, state)

@@ -42,7 +42,7 @@ def test_the_test_that_is_written_passes(contract: str, tmp_path: Path, monkeypa
 
 
 def test_every_contract_has_a_template() -> None:
-    nouns = {"linear-solver": "linear", "system": "scene"}
+    nouns = {"linear-solver": "linear", "system": "scene", "pde": "scene"}
     assert {nouns.get(contract, contract) for contract in CONTRACTS} == set(NOUNS)
 
 

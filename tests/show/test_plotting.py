@@ -27,9 +27,15 @@ def test_a_study_with_figures_is_read_without_what_draws_and_solves():
     assert read.stdout == "[]\n"
 
 
-@pytest.mark.parametrize("name", plotting.__all__)
+@pytest.mark.parametrize("name", sorted({*plotting.__all__} - {"Picture"}))
 def test_every_name_of_matplotlib_is_there_when_it_is_asked_for(name):
     assert getattr(plotting, name).__module__.startswith("matplotlib")
+
+
+def test_a_picture_is_a_figure_of_matplotlib_that_makes_a_png_of_itself():
+    picture = plotting.Picture(lambda figure: str(figure.get_figwidth()).encode(), figsize=(2, 1))
+    assert isinstance(picture, plotting.Figure)
+    assert picture._repr_png_() == b"2.0"
 
 
 def test_a_name_that_it_does_not_have():

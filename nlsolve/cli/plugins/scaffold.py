@@ -28,11 +28,15 @@ def nlsolve_components():
 
 @dataclass(frozen=True)
 class Contract:
-    """What a plugin is checked by: the check of `nlsolve.testing`, what else it needs, and its arguments."""
+    """What a plugin is checked by: the check of `nlsolve.testing`, what else it imports, and its arguments.
+
+    needs : libraries that the plugin imports and nlsolve does not bring.
+    """
 
     check: str
     arguments: str = ""
     imports: tuple[str, ...] = ()
+    needs: tuple[str, ...] = ()
 
 
 CONTRACTS: Mapping[str, Contract] = {
@@ -41,6 +45,7 @@ CONTRACTS: Mapping[str, Contract] = {
     "discretizer": Contract("check_discretizer", ", toy_cloud()", ("toy_cloud",)),
     "scene": Contract("check_scene", ", ToyLaw()", ("ToyLaw",)),
     "system": Contract("check_system"),
+    "pde": Contract("check_simulation", needs=("scikit-fem>=10",)),
     "linear-solver": Contract("check_linear_solver"),
     "refresh": Contract("check_refresh_rule"),
     "operator": Contract("check_operator"),
@@ -66,7 +71,8 @@ def files_of(contract: str, name: str, package: bool) -> dict[str, str]:
         "kind": name,
         "module": module,
         "cls": cls,
-        "noun": contract.replace("-", " "),
+        "noun": {"pde": "partial differential equation"}.get(contract, contract.replace("-", " ")),
+        "dependencies": "".join(f', "{library}"' for library in made.needs),
         "study": study,
         "version": version("nlsolve"),
         "hook_import": ", hookimpl" if package else "",

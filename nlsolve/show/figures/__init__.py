@@ -10,6 +10,7 @@ from __future__ import annotations
 import json
 from dataclasses import dataclass
 from difflib import get_close_matches
+from functools import partial
 from pathlib import Path
 from typing import Annotated
 
@@ -115,7 +116,7 @@ def drawn(spec: BaseFigure, frames: Frames) -> tuple[plotting.Figure, pd.DataFra
         raise spec.refuse(f"font {spec.font!r} is not installed; there are {listing([*FONTS, *near])}")
     with plotting.rc_context(style_of(spec)):
         width = spec.wide(COLUMN)
-        figure = plotting.Picture(spec, figsize=(width, 0.72 * width), layout="constrained")
+        figure = plotting.Picture(partial(as_png, look=spec), figsize=(width, 0.72 * width), layout="constrained")
         told = spec.paint(figure, frames)
     return figure, told
 

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from contextlib import nullcontext
-from types import SimpleNamespace
 from typing import Any
 
 from nlsolve.algebra.system import System
@@ -13,23 +11,20 @@ from nlsolve.contracts.continuum.discretizer import Discretizer
 from nlsolve.contracts.continuum.law import ConstitutiveLaw
 from nlsolve.contracts.linear_solver import LinearSolver
 from nlsolve.contracts.nonlinear_solver import NonlinearSolver
-from nlsolve.contracts.recording import SystemStart
 from nlsolve.contracts.rules.globalization import Globalization
 from nlsolve.contracts.rules.homotopy_form import HomotopyForm
 from nlsolve.contracts.rules.operator import IterationOperator
 from nlsolve.contracts.rules.predictor import Predictor
 from nlsolve.contracts.rules.range_rule import RangeRule
 from nlsolve.contracts.rules.refresh import RefreshRule
-from nlsolve.contracts.scene import Scene, Simulation
+from nlsolve.contracts.scene import Scene
 from nlsolve.contracts.status import SolveError, Status
 from nlsolve.flow.scene import FlowScene
 from nlsolve.testing.discretizers import check_discretizer
 from nlsolve.testing.kit.toys import ToyLaw, toy_cloud, toy_flow
-from nlsolve.testing.kit.verdicts import Told, Verdict, promise, verdicts
+from nlsolve.testing.kit.verdicts import Told, Verdict, verdicts
 from nlsolve.testing.laws import check_law
 from nlsolve.testing.linear_solvers import check_linear_solver
-from nlsolve.testing.problems import check_problem
-from nlsolve.testing.promises import require
 from nlsolve.testing.rules import (
     check_globalization,
     check_homotopy_form,
@@ -38,26 +33,9 @@ from nlsolve.testing.rules import (
     check_range_rule,
     check_refresh_rule,
 )
-from nlsolve.testing.scenes import check_scene, check_system
+from nlsolve.testing.scenes import check_scene, check_simulation, check_system
 from nlsolve.testing.solvers import check_solver
-from nlsolve.testing.toy_problem import DenseLU, ToyProblem
-
-
-def check_simulation(scene: Scene, parts: Any = None) -> None:
-    """Check that a scene builds its simulation, and that the problem of its sample has its Jacobian and series.
-
-    parts : the components of its sections; without them it gets a linear solver, and the start of a system.
-    """
-    with promise("simulation", "the scene builds a Simulation"):
-        given = SimpleNamespace(scene=scene, linear=DenseLU(), start=SystemStart()) if parts is None else parts
-        simulation = scene.simulation(given, lambda kind: nullcontext())
-        told = f"simulation() gave a {type(simulation).__name__}, not a Simulation"
-        require(isinstance(simulation, Simulation), told)
-    with promise("sample", "its sample is a problem and a state (U,) of it"):
-        problem, state = simulation.sample()
-        residual = problem.residual(state)
-        require(residual.shape == state.shape, f"R of shape {residual.shape} at a state of shape {state.shape}")
-    check_problem(problem, state)
+from nlsolve.testing.toy_problem import ToyProblem
 
 
 def check_operator_anywhere(operator: IterationOperator) -> None:

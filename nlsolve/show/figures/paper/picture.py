@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 from matplotlib.figure import Figure
 
-from nlsolve.show.figures.paper.files import as_png
-from nlsolve.show.figures.paper.look import Look
-
 
 class Picture(Figure):
-    """A figure and its look, by which it is drawn."""
+    """A figure, and what makes a PNG of it."""
 
-    def __init__(self, look: Look, **keywords: Any) -> None:
+    def __init__(self, png: Callable[[Figure], bytes], **keywords: Any) -> None:
         super().__init__(**keywords)
-        self.look = look
+        self._png = png
 
     def _repr_png_(self) -> bytes:
-        return as_png(self, self.look)
+        return self._png(self)
