@@ -6,6 +6,7 @@ Anderson (1965); Walker & Ni (2011), whose rule for an ill-conditioned ΔF is to
 from __future__ import annotations
 
 import numpy as np
+from scipy.linalg.lapack import dgeqrf
 
 WORST_CONDITION = 1e8  # of R in ΔF = Q R: beyond it γ amplifies the rounding in f
 
@@ -39,7 +40,8 @@ class Mixing:
         plain = u + self._damping * f
         while m := len(self._changes):
             rows = np.array([*self._changes, f])
-            r: np.ndarray = np.asarray(np.linalg.qr(rows.T, mode="r"))  # of (ΔF f): beside the R of ΔF stands Qᵀ f
+            # Of (ΔF f): beside the R of ΔF stands Qᵀ f. numpy's qr is the same routine, at twice the time.
+            r = np.triu(dgeqrf(rows.T)[0][: m + 1])
             left, sizes, right = np.linalg.svd(r[:m, :m])
             if sizes[0] < WORST_CONDITION * sizes[-1]:  # not where all changes are zero
                 gamma = (r[:m, m] @ left / sizes) @ right

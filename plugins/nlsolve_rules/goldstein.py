@@ -15,12 +15,12 @@ class Goldstein(Backtracking):
     """‖R‖² must fall by a good part of what its slope promises (Goldstein 1965), and where it falls by nearly all of
     that before t = 1, the step is made longer: t is interpolated down, then bisected up.
 
-    The line search of KINSOL has these two bounds, with 10⁻⁴ and 0.1 for c: a full step that hardly gains is taken
-    there, and cut here.
+    The line search of KINSOL has these two bounds, the upper one with 10⁻⁴ for c: a full step that hardly gains is
+    taken there, and cut here.
     """
 
     kind: Literal["goldstein"] = "goldstein"  # type: ignore[assignment]
-    fraction: float = Field(0.2, gt=0, lt=0.5, description="c, part of the promised decrease")
+    fraction: float = Field(0.1, gt=0, lt=0.5, description="c, part of the promised decrease")
 
     def search(self, problem: NonlinearProblem) -> Search:
         """The search of one solve, which remembers nothing."""

@@ -111,7 +111,7 @@ def test_a_cubic_without_a_least_point_takes_the_shortest_length() -> None:
 
 
 def test_goldsteins_bounds_cut_a_step_that_hardly_gains() -> None:
-    """‖R‖² ≤ 1 − 2 c t: at t = 1, c = 0.2, ‖R‖ ≤ 0.77. The parabola through 1 and 0.81 = 0.9² has its least point at
+    """‖R‖² ≤ 1 − 2 c t: at t = 1, c = 0.1, ‖R‖ ≤ 0.894. The parabola through 1 and 0.81 = 0.9² has its least point at
     1/1.81.
     """
     assert taken(Goldstein(), 0.7) == (1.0, 0.7, [1.0])
@@ -122,7 +122,7 @@ def test_goldsteins_bounds_cut_a_step_that_hardly_gains() -> None:
 
 
 def test_goldsteins_bounds_lengthen_a_step_that_gains_all_it_can() -> None:
-    """‖R‖² ≥ 1 − 2 (1 − c) t: after t = 1 has failed and 0.1 has gained more than 0.16, t is bisected between them."""
+    """‖R‖² ≥ 1 − 2 (1 − c) t: after t = 1 has failed and 0.1 has gained more than 0.18, t is bisected between them."""
     length, size, asked = taken(Goldstein(), 1e3, 0.9, 0.5)
     assert asked == pytest.approx([1.0, 0.1, 0.55])
     assert (length, size) == (pytest.approx(0.55), 0.5)
