@@ -41,7 +41,7 @@ GRADINGS = {
     "delaunay": {"resolution": 1.0, "layers": 5.0, "growth": 0.4},
     "mls": {"resolution": 1.0, "layers": 5.0, "growth": 0.4},
 }
-"""At s = 1, the best of those tried for each: about ten gradings at n = 0.1324."""
+"""At s = 1, the best of those tried at n = 0.1324: 9 for finite elements, 16 for `delaunay`, 4 for `mls`."""
 REFINEMENTS = {
     "finite elements": (2.0, 1.0, 0.5, 0.3),
     "delaunay": (2.0, 1.2, 0.6, 0.35, 0.2),
