@@ -33,6 +33,7 @@ MOST_CELLS = 2000
 ROW, CELL, LETTER, MARGIN = 4.6, 17.0, 1.45, 8.0  # height of a row, widths of a column and of a label's letter [mm]
 LETTERS_IN_CELL = 7  # "0.031 %"
 LEAST_CELL = 4.0  # width of a cell in which its words can be read [mm]
+BAR_HEIGHT = 0.1  # of the bar of colours, at least, which is 40 times as wide [inch]
 DOUBT = "#D55E00"
 FAILED_FACE: Any = {"facecolor": "0.93", "edgecolor": "0.72", "hatch": "//////", "linewidth": 0}
 NO_NUMBER = "–"
@@ -215,7 +216,7 @@ class MapFigure(BaseFigure):
             ax=axes,
             location="bottom",
             aspect=40,
-            fraction=0.03,
+            fraction=max(0.03, BAR_HEIGHT / figure.get_figheight()),
             pad=0.5 / rows,
             shrink=0.8,
         )
