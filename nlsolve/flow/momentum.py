@@ -193,12 +193,14 @@ class Flow(NonlinearProblem):
         """W ρ/Δt + carried − S C B − S_θ λ B_θ with pointwise moduli C (3, 3, M)."""
         points = moduli.shape[2]
         # −C as a sparse matrix with three entries a row: row a M + m holds columns m, M + m, 2 M + m.
-        columns = np.arange(points)[None, :, None] + points * np.arange(3)[None, None, :]
+        columns = (
+            np.arange(points, dtype=np.int32)[None, :, None] + points * np.arange(3, dtype=np.int32)[None, None, :]
+        )
         pointwise = sp.csr_array(
             (
                 -np.ascontiguousarray(moduli.transpose(0, 2, 1)).ravel(),
                 np.broadcast_to(columns, (3, points, 3)).ravel(),
-                np.arange(0, 9 * points + 1, 3),
+                np.arange(0, 9 * points + 1, 3, dtype=np.int32),
             ),
             shape=(3 * points, 3 * points),
         )

@@ -167,8 +167,8 @@ class Triangles:
         """The mean of div v over each patch."""
         corners, areas, patch = self.corners, self.areas, self.patch
         count = int(patch.max()) + 1
-        columns = 2 * corners[:, :, None] + np.arange(2)
-        rows = np.broadcast_to(patch[:, None, None], columns.shape)
+        columns = (2 * corners[:, :, None] + np.arange(2)).astype(np.int32)  # as all other operators have them
+        rows = np.broadcast_to(patch.astype(np.int32)[:, None, None], columns.shape)
         shape = (count, 2 * len(self.cloud.nodes))
         # Patch area times mean divergence: the net flux out of each patch.
         net_flux = sp.csr_array((self.hat_gradients.ravel(), (rows.ravel(), columns.ravel())), shape=shape)
