@@ -29,9 +29,7 @@ def test_no_file_of_nodes_crashes(tmp_path: Path):
 
 
 @pytest.mark.slow
-@pytest.mark.filterwarnings(
-    "ignore::scipy.linalg.LinAlgWarning"
-)  # SciPy's own method says so of its matrix, and goes on
+@pytest.mark.filterwarnings("ignore::scipy.linalg.LinAlgWarning")  # a method of SciPy tells of it and goes on
 @pytest.mark.parametrize(("documents", "part"), [(systems, 0.03), (flows, 0.005)], ids=["systems", "flows"])
 def test_no_run_of_many_crashes(documents, part):
     found = list(endings(drawn(documents(), part, seed=4), SECONDS))
