@@ -12,7 +12,9 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+import scipy
 import scipy.sparse as sp
+from nlsolve_discretizers.elements.mesh import Mesh
 from nlsolve_discretizers.weights.triangles import Triangles
 from skfem import Basis, BilinearForm, ElementTriP1, ElementTriP2, ElementVector, MeshTri, MeshTri2
 from skfem.helpers import div
@@ -64,6 +66,13 @@ class TaylorHood:
         couple = -BilinearForm(lambda v, q, w: q * div(v)).assemble(velocities, pressures).tocsr()[1:]  # p_0 = 0
         self._couple = couple
         self._prepare(couple[:, self.unknowns])
+
+    def wall_velocity(self, scene: Any, law: ConstitutiveLaw, cloud: Cloud) -> np.ndarray:
+        """V at `points[wall]`, (W, 2), as the scene prescribes it at the walls' nodes and the middles between them."""
+        walls = Mesh.of(cloud)
+        nearest = scipy.spatial.cKDTree(walls.nodes[walls.boundary]).query(self.points[self.wall])[1]
+        found: np.ndarray = scene.boundary_velocity(walls, law, 0.0)[nearest]
+        return found
 
     def _prepare(self, couple: Any) -> None:
         """The pattern of [[K, Bᵀ], [B, 0]], and which entries of element matrices add up to each of its entries."""

@@ -9,6 +9,8 @@ from nlsolve.contracts.continuum.cloud import Cloud, Exact, hat_gradients
 from nlsolve.contracts.continuum.discretizer import Discretizer, Operators, PointOperators
 from nlsolve.contracts.continuum.law import ConstitutiveLaw, PowerForm, local_index, stress, tangent_moduli
 from nlsolve.contracts.continuum.terms import NodeMotion, Physics, Recording, TimeSteps
+from nlsolve.contracts.continuum.walls import middles as wall_middles
+from nlsolve.contracts.continuum.walls import wall_edges
 from nlsolve.contracts.linear_solver import Factors, LinearSolver
 from nlsolve.contracts.nonlinear_solver import KeptTangent, NonlinearSolver, Step
 from nlsolve.contracts.problem import Expansion, NonlinearProblem, least_squares, norm, unit
@@ -93,4 +95,6 @@ __all__ = [
     "stress",
     "tangent_moduli",
     "unit",
+    "wall_edges",
+    "wall_middles",
 ]

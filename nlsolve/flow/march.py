@@ -14,7 +14,8 @@ from nlsolve.contracts.outcome import Outcome
 from nlsolve.contracts.problem import NonlinearProblem
 from nlsolve.contracts.scene import Entry, Simulation, Solve, Workload
 from nlsolve.contracts.status import SolveError, Status
-from nlsolve.flow.accuracy.adaptation import Adaptation, carried
+from nlsolve.flow.accuracy.adaptation import Adaptation
+from nlsolve.flow.accuracy.enrichment import carried
 from nlsolve.flow.accuracy.estimate import NOTHING_TO_COMPARE, UNKNOWN, Comparison, compared
 from nlsolve.flow.claims.units import SMALL, WAY_OUT
 from nlsolve.flow.continuation import REST, Solves, Stage, walk
@@ -105,7 +106,10 @@ class FlowSimulation(Simulation):
 
     def cloud(self) -> Cloud:
         """The nodes at t = 0. Raises SolveError (bad cloud) when none of them is inside."""
-        cloud = self.parts.scene.cloud(self.parts.law)
+        given = self.parts.scene.cloud(self.parts.law)
+        cloud = self.parts.discretizer.completed(given)
+        if self.adaptation is not None:
+            self.adaptation.added = len(cloud.nodes) / len(given.nodes)
         if not len(cloud.interior):
             extent = float(np.ptp(cloud.nodes, axis=0).max())
             raise SolveError(
@@ -158,14 +162,14 @@ class FlowSimulation(Simulation):
             except SolveError as refusal:  # a better cloud may be one on which the flow can be solved
                 refused, found = refusal, UNKNOWN
         adaptation.judge(found)
-        count = None if adaptation.reached else adaptation.next_count(len(state.cloud.nodes))
+        count = None if adaptation.reached else adaptation.next_count(len(state.cloud.nodes), state.discretizer.order)
         if count is None:
             if refused is not None:
                 raise refused
             return False
         here = state.cloud
         with state.entry("operators"):
-            cloud = adaptation.cloud(self.parts.scene, here, state.velocity, count)
+            cloud = adaptation.cloud(self.parts.scene, state.discretizer, here, state.velocity, count)
             carry = carried(here, cloud)
         adaptation.rounds += 1
         state.carry_to(cloud, carry)

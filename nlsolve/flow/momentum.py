@@ -171,7 +171,8 @@ class Flow(NonlinearProblem):
         return self._linearized(isotropic(np.broadcast_to(viscosity, len(self.operators.strain.points))), carried)
 
     def jacobian_by(self, discretizer: Discretizer, u: Array) -> Any:
-        """J of the same terms on the same nodes by another discretizer, its rows times W/W′ of the two node areas.
+        """J of the same terms on the same nodes by another discretizer, its rows times W/W′ of the two node areas
+        (1 where one of these is 0).
 
         λ is that of the nearest volume point of this flow. Raises SolveError when the nodes carry no such operators.
         """
@@ -187,7 +188,9 @@ class Flow(NonlinearProblem):
         inertia, convection = self._terms
         boundary = self._lifted[node_major(self.cloud.boundary)].reshape(-1, 2)
         other = Flow(self.cloud, others, self.law, boundary, modulus, inertia=inertia, convection=convection)
-        return sp.diags_array(self._areas / other._areas) @ other.jacobian(u)
+        both = (self._areas > 0.0) & (other._areas > 0.0)
+        ratio = np.divide(self._areas, other._areas, out=np.ones_like(self._areas), where=both)
+        return sp.diags_array(ratio) @ other.jacobian(u)
 
     def _linearized(self, moduli: Array, carried: Any) -> Any:
         """W ρ/Δt + carried − S C B − S_θ λ B_θ with pointwise moduli C (3, 3, M)."""

@@ -16,7 +16,7 @@ from nlsolve.contracts.continuum.terms import NodeMotion, Physics, Recording, Ti
 from nlsolve.contracts.linear_solver import LinearSolver
 from nlsolve.contracts.rules.predictor import Predictor
 from nlsolve.contracts.scene import Entry
-from nlsolve.flow.accuracy.enrichment import Enriched
+from nlsolve.flow.accuracy.enrichment import Finer
 from nlsolve.flow.claims.shapes import check_law, check_operators, check_velocity
 from nlsolve.flow.continuation import Start
 from nlsolve.flow.convection import Convection
@@ -182,7 +182,7 @@ class FlowState:
             self.others,
         )
 
-    def enriched(self, finer: Enriched, discretizer: Discretizer, velocity: Array) -> FlowState:
+    def enriched(self, finer: Finer, discretizer: Discretizer, velocity: Array) -> FlowState:
         """This flow, solved last with `velocity` (N, 2), on a finer cloud by a discretizer that may be another one.
 
         The pressure there is the one that the penalty has built up here. May raise SolveError (bad cloud).

@@ -86,7 +86,7 @@ class March:
         Raises InputError for a time that was not reached.
         """
         parts, k = self.parts, int(np.abs(self.times - self._reached("fields", time)).argmin())
-        initial = parts.scene.cloud(parts.law)
+        initial = parts.discretizer.completed(parts.scene.cloud(parts.law))
         cloud, moment = initial.moved_to(self.nodes[k]), float(self.times[k])
         wall = parts.scene.boundary_velocity(cloud, parts.law, moment)
         discretizer = parts.discretizer.for_law(parts.law, parts.scene.reference_rate)

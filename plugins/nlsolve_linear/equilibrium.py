@@ -25,13 +25,13 @@ def equilibrated(matrix: Any, symmetric: bool) -> tuple[np.ndarray, np.ndarray, 
     if symmetric:
         both, even = np.ones(matrix.shape[0]), matrix
         for _ in range(MOST):
-            largest = abs(even).max(axis=1).toarray().ravel()
+            largest = largest_in_rows(even)
             if ((largest == 0.0) | (np.abs(np.log2(np.fmax(largest, TINY))) <= NEAR)).all():
                 break
             both = both * powers_of_two(np.sqrt(largest))
             even = scaled(matrix, both, both)
         return both, both, even
-    rows = powers_of_two(abs(matrix).max(axis=1).toarray().ravel())
+    rows = powers_of_two(largest_in_rows(matrix))
     columns = powers_of_two(abs(scaled(matrix, rows, np.ones_like(rows))).max(axis=0).toarray().ravel())
     return rows, columns, scaled(matrix, rows, columns)
 
@@ -42,11 +42,22 @@ def scaled(matrix: Any, rows: np.ndarray, columns: np.ndarray) -> Any:
     return sp.csr_array((data, matrix.indices, matrix.indptr), shape=matrix.shape)
 
 
+def largest_in_rows(matrix: Any) -> np.ndarray:
+    """The largest |a| of each row of a sparse matrix in compressed rows, (U,); 0 for an empty row."""
+    starts, largest = matrix.indptr[:-1], np.zeros(matrix.shape[0])
+    filled = np.diff(matrix.indptr) > 0
+    if filled.any():
+        largest[filled] = np.maximum.reduceat(np.abs(matrix.data), starts[filled])
+    return largest
+
+
 def is_symmetric(compressed: Any) -> bool:
-    """Whether a sparse matrix is its transpose, to 1e-12 of its largest entry.
+    """Whether a sparse matrix, compressed and sorted, is its transpose, to 1e-12 of its largest entry.
 
     Entries that cancel are stored on one side and not on the other, so the patterns need not be the same.
     """
-    largest = abs(compressed).max() if compressed.nnz else 0.0
-    difference = abs(compressed - compressed.T)
-    return bool(difference.nnz == 0 or difference.max() <= ASYMMETRY * largest)
+    largest = np.abs(compressed.data).max(initial=0.0)
+    turned = compressed.T.asformat(compressed.format)
+    alike = all(np.array_equal(getattr(turned, name), getattr(compressed, name)) for name in ("indptr", "indices"))
+    difference = turned.data - compressed.data if alike else (compressed - turned).data
+    return bool(np.abs(difference).max(initial=0.0) <= ASYMMETRY * largest)

@@ -48,7 +48,14 @@ class _Analysed:
 
     def __init__(self, kind: str, matrix: Any) -> None:
         types = {"lu": mkl.MTYPE_REAL_NONSYM, "ldlt": mkl.MTYPE_REAL_SYM_INDEF}
-        self.solver: Any = mkl.PardisoSolver(matrix, types[kind], iparms=PARAMETERS[kind])
+        # Its constructor looks at a symmetric matrix row by row, which takes longer than the analysis: it gets one row.
+        # The pattern is set in what it wraps; tests hold every release against this.
+        one = sp.csr_array(np.ones((1, 1)))
+        self.solver: Any = mkl.PardisoSolver(one, types[kind], iparms=PARAMETERS[kind])
+        starts, columns = (part.astype(np.int64) for part in (matrix.indptr, matrix.indices))
+        self.solver._solver.set_pattern(ia=starts, ja=columns, n=matrix.shape[0])
+        self.solver.set_iparm(ENTRIES, PARAMETERS[kind][ENTRIES])  # has become the number of entries of one row
+        self.solver.factor(matrix.data)
         self._kind, self._pattern = kind, (matrix.indptr, matrix.indices)
         self._held = matrix.data
 
@@ -75,27 +82,33 @@ class PardisoFactors(Factors):
         self._values = stored.data
         self._library: _Analysed
         earlier = previous._library if isinstance(previous, PardisoFactors) else None
+        norm = float(abs(matrix).sum(axis=1).max())
         try:
             if earlier is not None and earlier.is_of(kind, stored):
                 self._library = earlier
                 self._library.hold(self._values)
-                if self._left(matrix) > ACCURATE:  # the analysis has the scaling and the matching of other values
+                left = self._left(matrix, norm)
+                if left > ACCURATE:  # the analysis has the scaling and the matching of other values
                     self._library.hold(self._values, anew=True)
+                    left = self._left(matrix, norm)
             else:
                 self._library = _Analysed(kind, stored)
+                left = self._left(matrix, norm)
         except RuntimeError as failure:
             raise SolveError(Status.SINGULAR_TANGENT, f"PARDISO: {failure}") from failure
-        left = self._left(matrix)
         if not left <= ACCURATE:
             raise SolveError(Status.SINGULAR_TANGENT, "PARDISO: its factors do not solve with the matrix")
         self.ordering = f"metis, {kind}"
         self.fill = int(self._library.solver.get_iparm_value(ENTRIES))
 
-    def _left(self, matrix: Any) -> float:
-        """‖b − A x‖ over ‖A‖ ‖x‖ + ‖b‖, maximum norms, for one b; infinite where A counts as singular."""
+    def _left(self, matrix: Any, norm: float) -> float:
+        """‖b − A x‖ over ‖A‖ ‖x‖ + ‖b‖, maximum norms, for one b; infinite where A counts as singular.
+
+        norm : ‖A‖.
+        """
         b = np.cos(np.arange(len(self._rows)))
         x = self._library.solver.solve(b)
-        left, terms = np.abs(b - matrix @ x).max(), abs(matrix).sum(axis=1).max() * np.abs(x).max()
+        left, terms = np.abs(b - matrix @ x).max(), norm * np.abs(x).max()
         unreached = self._library.solver.get_iparm_value(PERTURBED) > 0 and not left <= REACHED
         return np.inf if unreached or not terms < SINGULAR else float(left / (terms + 1.0))
 

@@ -69,7 +69,8 @@ class Operators:
 
     strain : B and S, at M points.
     volumetric : B_θ and S_θ, at L points; None when no volumetric term was asked for.
-    node_areas : W of a conservative form, (F,) [mm²]; None in a strong form.
+    node_areas : W ≥ 0 of a conservative form, (F,) [mm²], 0 where the rule for other terms has no weight; None in a
+        strong form.
     neighbours : what the discretizer found on the cloud and can use again in `moved`; nothing else reads it.
     """
 
@@ -104,6 +105,8 @@ class Discretizer(Component, ABC):
     """Table of the discretizer that solves the flow on an enriched cloud, to estimate the error of this one's solutions
     when a study names none. None: no estimate.
     """
+    order: ClassVar[float] = 2.0
+    """k, the power of the nodes' distance with which the error of a smooth velocity falls."""
 
     def for_law(self, law: ConstitutiveLaw, rate: float) -> Discretizer:
         """This discretizer, with what it leaves open chosen for a law at strain rates of about `rate` [1/s]."""
@@ -112,6 +115,12 @@ class Discretizer(Component, ABC):
     def compiled_by(self) -> str | None:
         """What compiled the code that builds the operators, e.g. "numba 0.68.1"; asking loads it."""
         return None
+
+    def completed(self, cloud: Cloud) -> Cloud:
+        """The nodes at which this discretizer solves for velocities: those of the scene, first and in their order, and
+        those that it adds. May raise SolveError (bad cloud).
+        """
+        return cloud
 
     @abstractmethod
     def operators(self, cloud: Cloud, volumetric: bool) -> Operators:

@@ -1,21 +1,20 @@
 """Solve, estimate, make a cloud for the error asked for, solve again: the rounds of adaptive nodes.
 
-    N′ = N · estimate/(AIM · error),   at most FASTEST N and at least SLOWEST N
+    N′ = N · (estimate/(AIM · error))^(2/k),   at most FASTEST N and at least SLOWEST N
 
-An error of second order in h goes like 1/N once the spacing has the shape of the solution. What the first clouds miss
+An error of order k in h goes like N^(−k/2) once the spacing has the shape of the solution. What the first clouds miss
 shows on the next, so that N grows by no more than FASTEST at once.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
-import scipy
 
 from nlsolve.contracts.continuum.adaptive import AdaptiveNodes
 from nlsolve.contracts.continuum.cloud import Cloud
+from nlsolve.contracts.continuum.discretizer import Discretizer
 from nlsolve.contracts.continuum.geometry import Geometry
 from nlsolve.contracts.status import SolveError, Status
 from nlsolve.flow.accuracy.estimate import Comparison
@@ -41,12 +40,14 @@ class Adaptation:
     rounds : clouds made from a solution.
     factorizations : matrices factorised for the estimates.
     found : the last estimate; None before the first.
+    added : nodes of the last cloud over those that the scene gave it.
     """
 
     asked: AdaptiveNodes
     rounds: int = 0
     factorizations: int = 0
     found: Comparison | None = field(default=None)
+    added: float = 1.0
 
     def judge(self, found: Comparison) -> None:
         """Take in the estimate for the present cloud. Raises SolveError (not applicable) where there is none."""
@@ -64,21 +65,27 @@ class Adaptation:
         """Whether the last estimate is within the error asked for."""
         return self.found is not None and self.found.larger <= self.asked.error
 
-    def next_count(self, nodes: int) -> int | None:
-        """N′ for a cloud of N `nodes`; None where the limits allow no larger cloud."""
+    def next_count(self, nodes: int, order: float) -> int | None:
+        """N′ for a cloud of N `nodes` and an error of this order; None where the limits allow no larger cloud."""
         assert self.found is not None
-        growth = float(np.clip(self.found.larger / (AIM * self.asked.error), SLOWEST, FASTEST))
+        wanted = (self.found.larger / (AIM * self.asked.error)) ** (2.0 / order)
+        growth = float(np.clip(wanted, SLOWEST, FASTEST))
         count = min(round(growth * nodes), self.asked.most_nodes)
         return count if self.rounds < self.asked.most_rounds and count > WORTH * nodes else None
 
-    def cloud(self, scene: Geometry, here: Cloud, velocity: Array, count: int) -> Cloud:
-        """The next cloud, of about `count` nodes, for the `velocity` (N, 2) `here`. May raise SolveError."""
+    def cloud(self, scene: Geometry, discretizer: Discretizer, here: Cloud, velocity: Array, count: int) -> Cloud:
+        """The next cloud, of about `count` nodes with those that the discretizer adds, for the `velocity` (N, 2)
+        `here`. May raise SolveError.
+        """
         most = self.asked.most_nodes
         while True:
-            made = scene.graded(wanted_spacing(here, velocity, count, self.asked.spacing), self.asked)
-            if len(made.nodes) <= most or count <= FEWEST:
-                return made
-            count = int(count * most / len(made.nodes) / WORTH)
+            wanted = max(round(count / self.added), FEWEST)
+            made = scene.graded(wanted_spacing(here, velocity, wanted, self.asked.spacing), self.asked)
+            completed = discretizer.completed(made)
+            self.added = len(completed.nodes) / len(made.nodes)
+            if len(completed.nodes) <= most or wanted <= FEWEST:
+                return completed
+            count = int(count * most / len(completed.nodes) / WORTH)
 
     def shortfall(self, nodes: int) -> str:
         """Why the error asked for is not reached, and the way out."""
@@ -91,15 +98,3 @@ class Adaptation:
             f"{found.worst:.2g} at the worst node; nodes.error = {asked.error:g} was asked for, and {limit} allows no "
             "better cloud: allow more, or ask for less"
         )
-
-
-def carried(here: Cloud, there: Cloud) -> Callable[[Array], Array]:
-    """Values (N, 2) at the nodes `here` -> at the nodes `there`: linear between nodes, the nearest beyond them."""
-    triangles = scipy.spatial.Delaunay(here.nodes)
-    nearest = scipy.spatial.cKDTree(here.nodes).query(there.nodes)[1]
-
-    def values(at_nodes: Array) -> Array:
-        between = scipy.interpolate.LinearNDInterpolator(triangles, at_nodes)(there.nodes)
-        return np.where(np.isnan(between), at_nodes[nearest], between)
-
-    return values

@@ -1,15 +1,42 @@
-"""A cloud with more nodes: in the middle of the edges of its triangulation, those of curved walls on the curve."""
+"""A cloud with more nodes: in the middle of the edges of its triangulation, those of curved walls on the curve; or
+those that a discretizer adds.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 import scipy
 
 from nlsolve.contracts.continuum.cloud import Cloud, Indices
-from nlsolve.flow.accuracy.walls import middles, wall_edges
+from nlsolve.contracts.continuum.walls import middles, wall_edges
 from nlsolve.series import Array
+
+
+class Finer(Protocol):
+    """A cloud whose first N nodes are those of a coarser one."""
+
+    @property
+    def cloud(self) -> Cloud:
+        """The cloud, M nodes."""
+
+    def carry(self, values: Array, /) -> Array:
+        """Values at the coarser cloud's nodes (N, …) -> at all nodes (M, …)."""
+
+
+@dataclass(frozen=True)
+class Completed:
+    """A cloud to which a discretizer has added nodes of its own."""
+
+    cloud: Cloud
+    coarser: Cloud
+
+    def carry(self, values: Array) -> Array:
+        """Linear between the coarser cloud's nodes."""
+        return np.concatenate([values, carried(self.coarser, self.cloud)(values)[len(values) :]])
 
 
 @dataclass(frozen=True)
@@ -57,3 +84,15 @@ def twice_as_fine(cloud: Cloud) -> Enriched:
     }
     nodes = np.concatenate([within.cloud.nodes, middles(cloud.nodes, walls[named])])
     return Enriched(Cloud(nodes, groups), np.concatenate([within.ends, walls[named, 1:3]]))
+
+
+def carried(here: Cloud, there: Cloud) -> Callable[[Array], Array]:
+    """Values (N, 2) at the nodes `here` -> at the nodes `there`: linear between nodes, the nearest beyond them."""
+    triangles = scipy.spatial.Delaunay(here.nodes)
+    nearest = scipy.spatial.cKDTree(here.nodes).query(there.nodes)[1]
+
+    def values(at_nodes: Array) -> Array:
+        between = scipy.interpolate.LinearNDInterpolator(triangles, at_nodes)(there.nodes)
+        return np.where(np.isnan(between), at_nodes[nearest], between)
+
+    return values

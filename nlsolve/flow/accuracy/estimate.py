@@ -3,7 +3,8 @@
     V* = V_fine + ⅓ (V_fine − V_coarse)
 
 V_fine is the estimator's solution with a node in the middle of every edge, V_coarse that on the cloud itself: what is
-of second order in the distance of the nodes cancels (Richardson 1911).
+of second order in the distance of the nodes cancels (Richardson 1911). An estimator that adds nodes to a cloud, such as
+triangles of degree 2, is of a higher order: V* is its solution with the nodes of the cloud and its own.
 
 The pressure that the penalty has built up is given to both beside the penalty, so that what is left of the
 compressibility is a small part of what it was: V* − V has the error of the penalty in it too (a step of Uzawa 1958;
@@ -22,11 +23,12 @@ from typing import Any
 
 import numpy as np
 
+from nlsolve.contracts.continuum.cloud import Cloud
 from nlsolve.contracts.continuum.discretizer import Discretizer
 from nlsolve.contracts.linear_solver import Factors, LinearSolver
 from nlsolve.contracts.nonlinear_solver import NonlinearSolver
 from nlsolve.contracts.status import SolveError, Status
-from nlsolve.flow.accuracy.enrichment import Enriched, enriched, twice_as_fine
+from nlsolve.flow.accuracy.enrichment import Completed, Finer, enriched, twice_as_fine
 from nlsolve.flow.accuracy.kept_factors import KeptFactors
 from nlsolve.flow.momentum import Flow
 from nlsolve.flow.state import FlowState
@@ -81,10 +83,17 @@ def compared(state: FlowState, velocity: Array, before: Array | None) -> Compari
     estimator, inside, work = state.parts.error_estimator, state.cloud.interior, Ledger()
     if estimator is None:
         return NOTHING_TO_COMPARE
-    nothing = np.empty((0, 2), dtype=int)
-    fine = _solution(state, twice_as_fine(state.cloud), estimator, velocity, before, work)
-    coarse = _solution(state, enriched(state.cloud, nothing), estimator, velocity, before, work)
-    best = fine[: len(velocity)] + RICHARDSON * (fine[: len(velocity)] - coarse)
+
+    def solution(finer: Finer) -> Array:
+        return _solution(state, finer, estimator, velocity, before, work)[: len(velocity)]
+
+    here = Cloud(state.cloud.nodes, state.cloud.boundaries)
+    completed = estimator.completed(here)
+    if len(completed.nodes) > len(here.nodes):
+        best = solution(Completed(completed, here))
+    else:
+        fine = solution(twice_as_fine(here))
+        best = fine + RICHARDSON * (fine - solution(enriched(here, np.empty((0, 2), dtype=int))))
     error = (best - velocity)[inside]
     return Comparison(
         float(np.linalg.norm(error) / np.linalg.norm(best[inside])),
@@ -107,7 +116,7 @@ class _Counted:
 
 def _solution(
     state: FlowState,
-    finer: Enriched,
+    finer: Finer,
     discretizer: Discretizer,
     velocity: Array,
     before: Array | None,

@@ -12,8 +12,8 @@ from nlsolve_laws import PowerLaw
 from nlsolve_scenes import Cavity, Couette, EccentricCylinders, StirringTool
 from nlsolve_scenes.nodes.rings import Rings
 
+from nlsolve.contracts.continuum.walls import cubic_weights, middles, wall_edges
 from nlsolve.flow.accuracy.enrichment import inner_edges, twice_as_fine
-from nlsolve.flow.accuracy.walls import cubic_weights, middles, wall_edges
 from nlsolve.plugin import Cloud
 
 

@@ -50,7 +50,8 @@ def middles(nodes: Array, edges: Indices) -> Array:
     straight = (turning < CORNER).any(axis=1)
     weights = cubic_weights(lengths)
     weights[straight] = [0.0, 0.5, 0.5, 0.0]
-    return np.einsum("ek,eka->ea", weights, nodes[edges])
+    places: Array = np.einsum("ek,eka->ea", weights, nodes[edges])
+    return places
 
 
 def cubic_weights(lengths: Array) -> Array:
