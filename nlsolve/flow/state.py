@@ -191,7 +191,8 @@ class FlowState:
         there = copy(self)
         there.cloud, there.moving, there.others = finer.cloud, None, {}
         there.velocity = there.guess = finer.carry(velocity)
-        there.operators = discretizer.operators(finer.cloud, self.volumetric)
+        same = discretizer == self.discretizer and len(finer.cloud.nodes) == len(self.cloud.nodes)
+        there.operators = self.operators if same else discretizer.operators(finer.cloud, self.volumetric)
         there.gradient = None if self.gradient is None else discretizer.gradient(finer.cloud)
         pressure = self.flow.pressure(self.flow.unknowns(velocity))
         if pressure is not None:

@@ -14,7 +14,8 @@ import scipy.sparse as sp
 from pydantic import Field
 
 from nlsolve.plugin import Factors, LinearSolver, SolveError, Status
-from nlsolve_linear.equilibrium import equilibrated, is_symmetric
+from nlsolve_linear.equilibrium import equilibrated
+from nlsolve_linear.layout import Layout, laid_out
 
 try:
     import pymklpardiso as mkl
@@ -46,7 +47,7 @@ SINGULAR = 1.0 / float(np.finfo(float).eps)
 class _Analysed:
     """One pattern with its analysis in the library, and the factors that this holds now."""
 
-    def __init__(self, kind: str, matrix: Any) -> None:
+    def __init__(self, kind: str, layout: Layout, matrix: Any) -> None:
         types = {"lu": mkl.MTYPE_REAL_NONSYM, "ldlt": mkl.MTYPE_REAL_SYM_INDEF}
         # Its constructor looks at a symmetric matrix row by row, which takes longer than the analysis: it gets one row.
         # The pattern is set in what it wraps; tests hold every release against this.
@@ -56,12 +57,8 @@ class _Analysed:
         self.solver._solver.set_pattern(ia=starts, ja=columns, n=matrix.shape[0])
         self.solver.set_iparm(ENTRIES, PARAMETERS[kind][ENTRIES])  # has become the number of entries of one row
         self.solver.factor(matrix.data)
-        self._kind, self._pattern = kind, (matrix.indptr, matrix.indices)
+        self.kind, self.layout = kind, layout
         self._held = matrix.data
-
-    def is_of(self, kind: str, matrix: Any) -> bool:
-        """Whether a matrix has this pattern and shall have factors of this kind."""
-        return self._kind == kind and all(map(np.array_equal, self._pattern, (matrix.indptr, matrix.indices)))
 
     def hold(self, values: np.ndarray, anew: bool = False) -> None:
         """Make the library hold the factors of these values, with a new analysis if wanted."""
@@ -75,16 +72,18 @@ class _Analysed:
 class PardisoFactors(Factors):
     """L and U, or L and D, of one matrix."""
 
-    def __init__(self, rows: Any, symmetric: bool, previous: Factors | None) -> None:
+    def __init__(self, compressed: Any, detect: bool, previous: Factors | None) -> None:
+        earlier = previous._library if isinstance(previous, PardisoFactors) else None
+        layout, rows = laid_out(compressed, None if earlier is None else earlier.layout)
+        symmetric = detect and layout.is_symmetric(rows)
         self._rows, self._columns, matrix = equilibrated(rows, symmetric)
         kind = "ldlt" if symmetric else "lu"
-        stored = sp.triu(matrix, format="csr") if symmetric else matrix
+        stored = layout.upper_of(matrix) if symmetric else matrix
         self._values = stored.data
         self._library: _Analysed
-        earlier = previous._library if isinstance(previous, PardisoFactors) else None
         norm = float(abs(matrix).sum(axis=1).max())
         try:
-            if earlier is not None and earlier.is_of(kind, stored):
+            if earlier is not None and earlier.kind == kind and earlier.layout is layout:
                 self._library = earlier
                 self._library.hold(self._values)
                 left = self._left(matrix, norm)
@@ -92,7 +91,7 @@ class PardisoFactors(Factors):
                     self._library.hold(self._values, anew=True)
                     left = self._left(matrix, norm)
             else:
-                self._library = _Analysed(kind, stored)
+                self._library = _Analysed(kind, layout, stored)
                 left = self._left(matrix, norm)
         except RuntimeError as failure:
             raise SolveError(Status.SINGULAR_TANGENT, f"PARDISO: {failure}") from failure
@@ -136,6 +135,4 @@ class Pardiso(LinearSolver):
             raise SolveError(Status.NOT_APPLICABLE, f"the linear solver 'pardiso' {ABSENT}")
         if not np.isfinite(matrix.data).all():
             raise SolveError(Status.NON_FINITE, "a tangent holds numbers that are not finite")
-        rows = matrix.tocsr(copy=True)  # sorted below; the caller's matrix stays as it is
-        rows.sum_duplicates()
-        return PardisoFactors(rows, self.symmetric == "detect" and is_symmetric(rows), previous)
+        return PardisoFactors(matrix.tocsr(), self.symmetric == "detect", previous)

@@ -56,7 +56,11 @@ class Enriched:
 
 def inner_edges(cloud: Cloud) -> Indices:
     """The edges of the Delaunay triangulation with a node inside, (E, 2). Across a hole both ends are at its wall."""
-    edges = edges_of(scipy.spatial.Delaunay(cloud.nodes).simplices)
+    return _inner_edges(cloud, scipy.spatial.Delaunay(cloud.nodes).simplices)
+
+
+def _inner_edges(cloud: Cloud, corners: Indices) -> Indices:
+    edges = edges_of(corners)
     return edges[~cloud.on_boundary[edges].all(axis=1)]
 
 
@@ -73,8 +77,8 @@ def enriched(cloud: Cloud, edges: Indices) -> Enriched:
 
 def twice_as_fine(cloud: Cloud) -> Enriched:
     """The cloud with a node in the middle of each edge inside and at walls: about four times as many."""
-    within = enriched(cloud, inner_edges(cloud))
-    walls = wall_edges(cloud, scipy.spatial.Delaunay(cloud.nodes).simplices)
+    corners = scipy.spatial.Delaunay(cloud.nodes).simplices
+    within, walls = enriched(cloud, _inner_edges(cloud, corners)), wall_edges(cloud, corners)
     both_in = [np.isin(walls[:, 1:3], group).all(axis=1) for group in cloud.boundaries.values()]
     named = np.array(both_in).reshape(len(both_in), len(walls)).any(axis=0)
     numbers = len(within.cloud.nodes) - 1 + np.cumsum(named)

@@ -1,0 +1,100 @@
+"""Where the entries of the matrices of one pattern are, so that each further one of them is only its values."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+
+from nlsolve_linear.equilibrium import ASYMMETRY, is_symmetric
+
+
+def laid_out(compressed: Any, before: Layout | None) -> tuple[Layout, Any]:
+    """The layout of a matrix in compressed rows, that of `before` if it fits, and the matrix with its entries sorted
+    and those that share a place added; the given one stays as it is.
+    """
+    if before is not None and before.fits(compressed):
+        return before, before.sorted(compressed)
+    layout = Layout.of(compressed)
+    if not layout.has_duplicates:
+        return layout, layout.sorted(compressed)
+    summed = compressed.copy()
+    summed.sum_duplicates()
+    return Layout.of(summed), summed
+
+
+@dataclass(frozen=True)
+class Layout:
+    """The pattern of a sparse matrix in compressed rows.
+
+    given : starts (U + 1,) of the rows and columns (E,) of the entries, in the order in which matrices have them.
+    order : (E,), which of these entries comes first, second, … with the columns of each row sorted; None: all are.
+    starts, columns : of the sorted entries.
+    """
+
+    given: tuple[np.ndarray, np.ndarray]
+    order: np.ndarray | None
+    starts: np.ndarray
+    columns: np.ndarray
+
+    @classmethod
+    def of(cls, matrix: Any) -> Layout:
+        """The pattern of a matrix in compressed rows; its own arrays may change later."""
+        given = matrix.indptr.copy(), matrix.indices.copy()
+        if matrix.has_sorted_indices:
+            return cls(given, None, *given)
+        numbered = sp.csr_array((np.arange(matrix.nnz), matrix.indices.copy(), matrix.indptr), shape=matrix.shape)
+        numbered.sort_indices()
+        return cls(given, numbered.data, numbered.indptr, numbered.indices)
+
+    @property
+    def has_duplicates(self) -> bool:
+        """Whether a place is stored twice."""
+        within_row = np.ones(len(self.columns), dtype=bool)
+        within_row[self.starts[:-1][np.diff(self.starts) > 0]] = False
+        return bool((within_row[1:] & (np.diff(self.columns) == 0)).any())
+
+    def fits(self, matrix: Any) -> bool:
+        """Whether a matrix in compressed rows has the same entries in the same order."""
+        starts, columns = self.given
+        return np.array_equal(starts, matrix.indptr) and np.array_equal(columns, matrix.indices)
+
+    def sorted(self, matrix: Any) -> Any:
+        """A matrix that fits, with its entries sorted; values are shared where they are so already."""
+        values = matrix.data if self.order is None else matrix.data[self.order]
+        return sp.csr_array((values, self.columns, self.starts), shape=matrix.shape)
+
+    @cached_property
+    def mirror(self) -> np.ndarray | None:
+        """For each sorted entry the number of the one on the other side of the diagonal, (E,); None where some have
+        none.
+        """
+        size = len(self.starts) - 1
+        numbered = sp.csr_array((np.arange(len(self.columns)), self.columns, self.starts), shape=(size, size))
+        turned = numbered.T.tocsr()
+        alike = np.array_equal(turned.indptr, self.starts) and np.array_equal(turned.indices, self.columns)
+        return turned.data if alike else None
+
+    def is_symmetric(self, matrix: Any) -> bool:
+        """Whether a sorted matrix of this pattern is symmetric, as `equilibrium.is_symmetric` has it."""
+        if self.mirror is None:
+            return is_symmetric(matrix)
+        largest = np.abs(matrix.data).max(initial=0.0)
+        return bool(np.abs(matrix.data - matrix.data[self.mirror]).max(initial=0.0) <= ASYMMETRY * largest)
+
+    @cached_property
+    def upper(self) -> Any:
+        """The numbers of the sorted entries on and above the diagonal, as the values of a matrix."""
+        size = len(self.starts) - 1
+        numbers = np.arange(1, len(self.columns) + 1)  # no zero, which is not stored
+        above = sp.triu(sp.csr_array((numbers, self.columns, self.starts), shape=(size, size)), format="csr")
+        above.data -= 1
+        return above
+
+    def upper_of(self, matrix: Any) -> Any:
+        """The entries on and above the diagonal of a sorted matrix of this pattern."""
+        upper = self.upper
+        return sp.csr_array((matrix.data[upper.data], upper.indices, upper.indptr), shape=matrix.shape)
