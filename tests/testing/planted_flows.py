@@ -104,6 +104,9 @@ class PlantedDiscretizer(Discretizer):
     def _inner(self) -> Discretizer:
         return MovingLeastSquares() if self.breaks == "forces" else LinearTriangles()
 
+    def completed(self, cloud: Cloud) -> Cloud:
+        return replace(cloud, nodes=cloud.nodes + 1.0) if self.breaks == "completed" else cloud
+
     def operators(self, cloud: Cloud, volumetric: bool) -> Operators:
         if self.breaks == "too few nodes" and len(cloud.nodes) == 4:
             return Operators(PointOperators(sp.csr_array((3, 8)), sp.csr_array((4, 3)), np.zeros((1, 2))))
@@ -263,6 +266,7 @@ DISCRETIZERS = {
     **{
         (check, check): PlantedDiscretizer(breaks=check)
         for check in (
+            "completed",
             "operators",
             "shapes",
             "rates",
