@@ -272,16 +272,16 @@ def _constant_series(value: Any) -> Series:
     return Series._by_rule(lambda j: start if j == 0 else np.zeros_like(start))
 
 
-def _convolve(x: Array, y: Array) -> Array:
-    """Σ_l x_l y_{j−l} over the whole of two heads of equal length."""
-    return np.einsum("l...,l...->...", x, y[::-1])
+def _convolve(x: Array, y: Array, weights: Array | None = None) -> Array:
+    """Σ_l w_l x_l y_{j−l} over the whole of two heads of equal length; w_l = 1 without weights."""
+    if weights is None:
+        return np.einsum("l...,l...->...", x, y[::-1])
+    return np.einsum("l,l...,l...->...", weights, x, y[::-1])
 
 
 def _derivative_convolve(x: Series, y: Series, j: int) -> Array:
     """(1/j) Σ_{l=1..j} l x_l y_{j−l}: coefficient j of the integral of x′ y."""
-    slope = x.head(j)[1:]
-    weights = np.arange(1.0, j + 1.0).reshape(-1, *[1] * (slope.ndim - 1)) / j
-    return _convolve(weights * slope, y.head(j - 1))
+    return _convolve(x.head(j)[1:], y.head(j - 1), np.arange(1.0, j + 1.0) / j)
 
 
 def _product(x: Series, y: Series) -> Series:
@@ -325,8 +325,7 @@ def _power(x: Series, exponent: float, function: Callable[[Array], Array] | None
         if j == 0:
             return start**exponent if function is None else function(start)
         slope = x.head(j)[1:]
-        weights = ((exponent + 1.0) / j * np.arange(1.0, j + 1.0) - 1.0).reshape(-1, *[1] * (slope.ndim - 1))
-        sums = _convolve(weights * slope, y.head(j - 1))
+        sums = _convolve(slope, y.head(j - 1), (exponent + 1.0) / j * np.arange(1.0, j + 1.0) - 1.0)
         at_zero = start == 0.0
         if not at_zero.any():
             if j == 1 and np.isnan(y.coefficient(0)[start < 0.0]).any():
@@ -360,9 +359,7 @@ def _from_slope(function: np.ufunc, x: Series, slope_of: Callable[[Series], Seri
 def _inverse_slope(y: Series, g: Series, rest: Array, j: int) -> Array:
     """y_j with coefficient j of ∫ g y′ equal to `rest`:  g₀ y_j = rest − (1/j) Σ_{l=1..j−1} l y_l g_{j−l}."""
     if j > 1:
-        slope = y.head(j - 1)[1:]
-        weights = np.arange(1.0, float(j)).reshape(-1, *[1] * (slope.ndim - 1)) / j
-        rest = rest - _convolve(weights * slope, g.head(j - 1)[1:])
+        rest = rest - _convolve(y.head(j - 1)[1:], g.head(j - 1)[1:], np.arange(1.0, float(j)) / j)
     return rest / g.coefficient(0)
 
 

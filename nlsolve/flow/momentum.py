@@ -355,6 +355,8 @@ class _Expansion(Expansion):
 
 def _magnitude(matrix: Any) -> Any:
     """|A|, with the same places as A."""
+    if not sp.issparse(matrix):
+        return abs(matrix)
     return sp.csr_array((np.abs(matrix.data), matrix.indices, matrix.indptr), shape=matrix.shape)
 
 

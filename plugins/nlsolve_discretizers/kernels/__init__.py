@@ -1,9 +1,9 @@
 """Formulas for many targets that numba compiles where it is installed: extra nlsolve[numba]. Else numpy runs them."""
 
-from nlsolve_discretizers.kernels import normal_equations, offsets, quadrants, ranking, rows
+from nlsolve_discretizers.kernels import normal_equations, offsets, products, quadrants, ranking, rows
 from nlsolve_discretizers.kernels.machine_code import compiler_name
 
-KERNELS = (normal_equations, offsets, quadrants, ranking, rows)
+KERNELS = (normal_equations, offsets, products, quadrants, ranking, rows)
 
 
 def loaded() -> str | None:

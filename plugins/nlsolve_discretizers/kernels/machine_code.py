@@ -25,7 +25,8 @@ def each(begin: int, end: int) -> Any:
 def compiled(function: Callable[..., Any], arguments: str, *called: Callable[..., Any]) -> Callable[..., Any] | None:
     """`function` as machine code; None where there is no compiler.
 
-    arguments : the kind (f, i, b) and the number of indices of each, e.g. "f2 i0"; arrays are only read.
+    arguments : the kind (f, i, b, and n: whole numbers of half the size) and the number of indices of each, and c for
+        an array whose numbers lie in order, e.g. "f2 i0 n2c"; arrays are only read.
     called : the functions that it calls, of its own file: when that changes all is compiled again.
     """
     return _code(function, arguments, called) if _allowed and compiler() is not None else None
@@ -68,11 +69,12 @@ def compiler() -> Any:
 @cache
 def _code(function: Callable[..., Any], arguments: str, called: tuple[Callable[..., Any], ...]) -> Callable[..., Any]:
     numba = compiler()
-    kinds = {"f": numba.float64, "i": numba.int64, "b": numba.boolean}
+    kinds = {"f": numba.float64, "i": numba.int64, "n": numba.int32, "b": numba.boolean}
 
     def declared(argument: str) -> Any:
         kind, indices = kinds[argument[0]], int(argument[1])
-        return numba.types.Array(kind, indices, "A", readonly=True) if indices else kind
+        layout = "C" if argument.endswith("c") else "A"
+        return numba.types.Array(kind, indices, layout, readonly=True) if indices else kind
 
     signature = tuple(map(declared, arguments.split()))
     for part in called:

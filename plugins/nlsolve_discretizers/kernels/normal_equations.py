@@ -16,7 +16,7 @@ import numpy as np
 
 from nlsolve_discretizers.kernels.machine_code import compiled, each
 
-AT_ONCE = 32  # targets in the innermost loops of machine code
+AT_ONCE = 64  # targets in the innermost loops of machine code
 LEAST = float(np.finfo(float).tiny)
 
 
@@ -26,25 +26,35 @@ def place(i: int, j: int) -> int:
 
 
 def fitted(
-    x: np.ndarray, y: np.ndarray, w: np.ndarray, degree: int, derivatives: Iterable[tuple[int, int]]
+    x: np.ndarray,
+    y: np.ndarray,
+    w: np.ndarray,
+    degree: int,
+    derivatives: Iterable[tuple[int, int]],
+    factors: np.ndarray | None = None,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """φ (D, k, T) of D derivatives ∂^(i+j)/∂x^i∂y^j, for weights w (k, T) at x, y (k, T).
+    """φ (D, k, T) of D derivatives ∂^(i+j)/∂x^i∂y^j times `factors` (D, T), for weights w (k, T) at x, y (k, T).
 
     Also the smallest pivot of R relative to its column, where √w P = Q R, (T,): the root of that of the elimination.
+
+    factors : 1 where they are absent.
     """
-    phi, smallest = (machine_code() or together)(x, y, w, degree, np.array(derivatives))
+    chosen = np.array(derivatives)
+    factors = np.ones((len(chosen), x.shape[1])) if factors is None else factors
+    phi, smallest = (machine_code() or together)(x, y, w, degree, chosen, factors)
     return phi, np.sqrt(smallest)
 
 
 def machine_code() -> Callable[..., Any] | None:
     """`in_blocks`, compiled; None where there is no compiler."""
-    return compiled(in_blocks, "f2 f2 f2 i0 i2", place, eliminated, together)
+    return compiled(in_blocks, "f2 f2 f2 i0 i2 f2", place, eliminated, together)
 
 
 def together(
-    x: np.ndarray, y: np.ndarray, w: np.ndarray, degree: int, derivatives: np.ndarray
+    x: np.ndarray, y: np.ndarray, w: np.ndarray, degree: int, derivatives: np.ndarray, factors: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """φ (D, k, T) of D derivatives ∂^(i+j)/∂x^i∂y^j, rows i, j of (D, 2), for weights w (k, T) at x, y (k, T).
+    """φ (D, k, T) of D derivatives ∂^(i+j)/∂x^i∂y^j, rows i, j of (D, 2), times `factors` (D, T), for weights w (k, T)
+    at x, y (k, T).
 
     Also the smallest pivot of the elimination relative to its diagonal entry, (T,): where it vanishes φ means nothing.
     """
@@ -79,7 +89,7 @@ def together(
             factorials *= n
         for n in range(2, j + 1):
             factorials *= n
-        system[place(i, j), count + d] = factorials
+        system[place(i, j), count + d] = factorials * factors[d]
     smallest = eliminated(system)
     phi = np.zeros((len(derivatives), near, targets))
     for d in range(len(derivatives)):
@@ -125,7 +135,7 @@ def eliminated(system: np.ndarray) -> np.ndarray:
 
 
 def in_blocks(
-    x: np.ndarray, y: np.ndarray, w: np.ndarray, degree: int, derivatives: np.ndarray
+    x: np.ndarray, y: np.ndarray, w: np.ndarray, degree: int, derivatives: np.ndarray, factors: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """`together`, AT_ONCE targets after AT_ONCE targets; φ of a target stays together."""
     near, targets = x.shape
@@ -138,6 +148,7 @@ def in_blocks(
             np.ascontiguousarray(w[:, begin:end]),
             degree,
             derivatives,
+            np.ascontiguousarray(factors[:, begin:end]),
         )
         phi[:, begin:end] = part.transpose(0, 2, 1)
     return phi.transpose(0, 2, 1), smallest

@@ -1,14 +1,17 @@
-"""B and S as sparse matrices, from neighbours and the weights of ∂/∂x and ∂/∂y."""
+"""B and S as sparse matrices, from neighbours and the weights of ∂/∂x and ∂/∂y; assembled when they must be."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
 
-from nlsolve_discretizers.kernels.rows import sparse_rows
+from nlsolve_discretizers.kernels import products
+from nlsolve_discretizers.kernels.rows import Row, sparse_rows
 
 X, Y = 0, 1
 
@@ -39,24 +42,111 @@ class Gradient:
         dx, dy = (sparse_rows(self.near, self.both, [[(0, axis, 1.0)]], 1, sources) for axis in (X, Y))
         return dx, dy
 
-    def strain(self, nodes: int) -> Any:
+    def strain(self, nodes: int) -> Unassembled:
         """B (3T, 2 nodes): xx, yy, xy of ½(∇v + ᵗ∇v)."""
         rows = [[(0, X, 1.0)], [(1, Y, 1.0)], [(0, Y, 0.5), (1, X, 0.5)]]
-        return sparse_rows(self.near, self.both, rows, 2, 2 * nodes)
+        return self._unassembled(products.STRAIN_RATE, rows, 2, 2 * nodes)
 
-    def divergence(self, nodes: int) -> Any:
+    def divergence(self, nodes: int) -> Unassembled:
         """div v (T, 2 nodes)."""
-        return sparse_rows(self.near, self.both, [[(0, X, 1.0), (1, Y, 1.0)]], 2, 2 * nodes)
+        return self._unassembled(products.DIVERGENCE, [[(0, X, 1.0), (1, Y, 1.0)]], 2, 2 * nodes)
 
-    def divergence_of_stress(self, points: int) -> Any:
+    def divergence_of_stress(self, points: int) -> Unassembled:
         """S (2T, 3 points): ∂xx/∂x + ∂xy/∂y and ∂xy/∂x + ∂yy/∂y, node-major."""
         xx, yy, xy = 0, points, 2 * points
         rows = [[(xx, X, 1.0), (xy, Y, 1.0)], [(yy, Y, 1.0), (xy, X, 1.0)]]
-        return sparse_rows(self.near, self.both, rows, 1, 3 * points, of_target_together=True)
+        return self._unassembled(products.DIVERGENCE_OF_STRESS, rows, 1, 3 * points, of_target_together=True)
 
-    def of_pressure(self, points: int) -> Any:
+    def of_pressure(self, points: int) -> Unassembled:
         """(2T, points): ∂p/∂x and ∂p/∂y, node-major."""
-        return sparse_rows(self.near, self.both, [[(0, X, 1.0)], [(0, Y, 1.0)]], 1, points, of_target_together=True)
+        return self._unassembled(products.GRADIENT, [[(0, X, 1.0)], [(0, Y, 1.0)]], 1, points, of_target_together=True)
+
+    def _unassembled(
+        self, which: int, rows: Sequence[Row], stride: int, columns: int, of_target_together: bool = False
+    ) -> Unassembled:
+        return Unassembled((len(rows) * len(self.near), columns), self, which, tuple(rows), stride, of_target_together)
+
+
+@dataclass(frozen=True, eq=False)
+class Unassembled:
+    """A sparse matrix of derivatives, `shape`, whose entries are made when they are first asked for.
+
+    A @ x with a vector asks for none where numba is installed: it reads each weight once. For all else A is a matrix of
+    SciPy, and what is made of it as well.
+
+    weights : the derivatives that its entries are made of.
+    which : the product A @ x among those of `kernels.products`.
+    rows, stride, of_target_together : the same in terms of `sparse_rows`.
+    """
+
+    shape: tuple[int, int]
+    weights: Gradient
+    which: int
+    rows: tuple[Row, ...]
+    stride: int
+    of_target_together: bool
+    dtype = np.dtype(float)
+    __array_ufunc__ = None  # so that NumPy's arrays leave x @ A to this class
+
+    def tocsr(self) -> Any:
+        """A as a SciPy array that stores rows, always the same one."""
+        return self._matrix
+
+    @cached_property
+    def _matrix(self) -> Any:
+        near, both = self.weights.near, self.weights.both
+        return sparse_rows(near, both, self.rows, self.stride, self.shape[1], self.of_target_together)
+
+    @cached_property
+    def _times(self) -> Callable[[np.ndarray], np.ndarray] | None:
+        """x -> A x from the weights; None where that is not compiled."""
+        code = products.machine_code()
+        if code is None:
+            return None
+        near, both = self.weights.near.astype(np.int32), np.ascontiguousarray(self.weights.both)
+        return partial(code, self.which, near, both)
+
+    def __matmul__(self, other: Any) -> Any:
+        if self._times is not None and isinstance(other, np.ndarray) and other.shape == self.shape[1:]:
+            return self._times(np.ascontiguousarray(other, dtype=float))
+        entries = _entries(other)
+        return self._matrix @ entries if isinstance(entries, np.ndarray) or sp.issparse(entries) else NotImplemented
+
+    def __abs__(self) -> Unassembled:
+        weights = Gradient(self.weights.near, np.abs(self.weights.both))
+        return replace(self, weights=weights)  # all factors are positive, and each weight has an entry of its own
+
+    def __getattr__(self, name: str) -> Any:
+        if name.startswith("_"):
+            raise AttributeError(name)
+        return getattr(self._matrix, name)
+
+    def __getitem__(self, part: Any) -> Any:
+        return self._matrix[part]
+
+    def __rmatmul__(self, other: Any) -> Any:
+        return other @ self._matrix
+
+    def __neg__(self) -> Any:
+        return -self._matrix
+
+    def __add__(self, other: Any) -> Any:
+        return self._matrix + _entries(other)
+
+    def __sub__(self, other: Any) -> Any:
+        return self._matrix - _entries(other)
+
+    def __rsub__(self, other: Any) -> Any:
+        return other - self._matrix
+
+    def __mul__(self, factor: Any) -> Any:
+        return self._matrix * factor
+
+    __radd__, __rmul__ = __add__, __mul__
+
+
+def _entries(matrix: Any) -> Any:
+    return matrix.tocsr() if isinstance(matrix, Unassembled) else matrix
 
 
 def rows_times(factors: np.ndarray, matrix: Any) -> Any:

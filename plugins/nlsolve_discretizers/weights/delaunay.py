@@ -31,10 +31,19 @@ def found(nodes: np.ndarray) -> np.ndarray:
 
 def ordered(corners: np.ndarray) -> np.ndarray:
     """The triangles with their least corner first, in the order of their corners: no trace of how they were found."""
-    first, count = corners.argmin(axis=1), np.int64(corners.max()) + 1
-    turned = corners[np.arange(len(corners))[:, None], (first[:, None] + np.arange(3)) % 3]
+    a, b, c = np.ascontiguousarray(corners.T)
+    count, from_a, from_b = np.int64(corners.max()) + 1, (a < b) & (a < c), b < c
+    turned = np.stack(
+        [np.where(from_a, x, np.where(from_b, y, z)) for x, y, z in ((a, b, c), (b, c, a), (c, a, b))], axis=1
+    )
     a, b, c = turned.T
     return turned[np.argsort((a * count + b) * count + c)]
+
+
+def side_keys(corners: np.ndarray, nodes: int) -> np.ndarray:
+    """A number for each side ab, bc, ca of each triangle, (3T,): smaller node times `nodes` plus the larger one."""
+    start, end = corners.ravel(), corners[:, [1, 2, 0]].ravel()
+    return np.minimum(start, end) * nodes + np.maximum(start, end)
 
 
 def kept(corners: np.ndarray, nodes: np.ndarray, walls: np.ndarray) -> np.ndarray | None:
@@ -76,7 +85,7 @@ def quadrilaterals(corners: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndar
     edges (2, H) of the hull. All go counter-clockwise.
     """
     start, end = corners.ravel(), corners[:, [1, 2, 0]].ravel()
-    key = np.minimum(start, end) * (int(corners.max()) + 1) + np.maximum(start, end)
+    key = side_keys(corners, int(corners.max()) + 1)
     order = np.argsort(key, kind="stable")
     again = np.flatnonzero(key[order[1:]] == key[order[:-1]])
     one, other = order[again], order[again + 1]

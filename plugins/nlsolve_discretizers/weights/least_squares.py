@@ -48,12 +48,13 @@ def fit(
     x, y = offsets / radius
     distance = np.sqrt(x * x + y * y)
     w = np.where(distance < 1.0, weight_function(weight, distance, shape), 0.0)
-    phi, smallest = fitted(x, y, w, degree, derivatives)
+    unscaled = np.stack([radius ** -float(i + j) for i, j in derivatives])
+    phi, smallest = fitted(x, y, w, degree, derivatives, unscaled)
     poor = np.flatnonzero(~(smallest >= SOUND))
     if len(poor):
-        phi[..., poor], smallest[poor] = _by_orthogonal_columns(x[:, poor], y[:, poor], w[:, poor], degree, derivatives)
-    order = np.array([i + j for i, j in derivatives])
-    return (phi / radius ** order[:, None, None]).transpose(0, 2, 1), smallest
+        scaled, smallest[poor] = _by_orthogonal_columns(x[:, poor], y[:, poor], w[:, poor], degree, derivatives)
+        phi[..., poor] = scaled * unscaled[:, None, poor]
+    return phi.transpose(0, 2, 1), smallest
 
 
 def _by_orthogonal_columns(

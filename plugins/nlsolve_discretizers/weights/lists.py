@@ -1,7 +1,8 @@
 """|x_s − x_t| ≥ r − Σ (|δx_t| + max_s |δx_s|) : the nearest sources of each target, listed once and ranked anew.
 
 A source that was farther than r from a target cannot have come nearer than that; lists with a few more sources than are
-needed therefore hold the nearest ones until the motion has used up the rest (Verlet 1967).
+needed therefore hold the nearest ones until the motion has used up the rest (Verlet 1967). The maximum is over sources
+near enough to come so near: what moves fast elsewhere does not matter.
 """
 
 from __future__ import annotations
@@ -57,7 +58,14 @@ class Lists:
 
         sources_before, targets_before : the number that each of them had, −1 for new ones; None: the same as now.
         """
-        reach = self.reach - _steps(self.sources, sources, sources_before).max(initial=0.0)
+        steps = np.zeros(len(self.sources))
+        if sources_before is None:
+            steps = _steps(self.sources, sources, None)
+        else:
+            old = np.flatnonzero(sources_before >= 0)
+            steps[sources_before[old]] = np.linalg.norm(sources[old] - self.sources[sources_before[old]], axis=1)
+        within = np.max(self.reach, where=np.isfinite(self.reach), initial=0.0) + steps.max(initial=0.0)
+        reach = self.reach - largest_near(self.sources, steps, self.targets, float(within))
         if targets_before is not None:
             reach = np.where(targets_before < 0, -np.inf, reach[targets_before])
         reach -= _steps(self.targets, targets, targets_before)
@@ -110,6 +118,27 @@ def _steps(before: np.ndarray, now: np.ndarray, numbers: np.ndarray | None) -> n
     if numbers is None:
         return np.linalg.norm(now - before, axis=1)
     return np.where(numbers < 0, 0.0, np.linalg.norm(now - before[numbers], axis=1))
+
+
+def largest_near(places: np.ndarray, values: np.ndarray, targets: np.ndarray, within: float) -> np.ndarray:
+    """An upper bound, (T,), of the `values` ≥ 0 (P,) at all `places` (P, 2) that are no farther than `within` from each
+    of the `targets` (T, 2): the largest one in nine square cells around each, 0 where these are empty.
+    """
+    (x, y), (at_x, at_y) = places.T, targets.T
+    west, south = min(x.min(), at_x.min()), min(y.min(), at_y.min())
+    width, height = max(x.max(), at_x.max()) - west, max(y.max(), at_y.max()) - south
+    side = max(within, max(width, height) / len(places) ** 0.5)  # no more cells than places
+    if not side > 0.0:
+        return np.full(len(targets), values.max(initial=0.0))
+
+    def cell(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        return ((x - west) / side).astype(np.intp), ((y - south) / side).astype(np.intp)
+
+    cells = np.zeros((int(width / side) + 3, int(height / side) + 3))  # an empty row and column on either side
+    np.maximum.at(cells[1:-1, 1:-1], cell(x, y), values)
+    rows = np.maximum(np.maximum(cells[:-2], cells[1:-1]), cells[2:])
+    blocks: np.ndarray = np.maximum(np.maximum(rows[:, :-2], rows[:, 1:-1]), rows[:, 2:])[cell(at_x, at_y)]
+    return blocks
 
 
 def _as_they_are(targets: int, sources: int) -> tuple[np.ndarray, np.ndarray]:

@@ -73,16 +73,15 @@ class Triangles:
         """Edges (E, 2), each once, smaller node first, and for each the triangles beside it (E, 2), −1 for none."""
         if self.found is not None:
             return self.found.edges
-        sides = np.sort(self.corners[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
-        owner = np.repeat(np.arange(len(self.corners)), 3)
-        key = sides[:, 0] * len(self.cloud.nodes) + sides[:, 1]
+        key = delaunay.side_keys(self.corners, len(self.cloud.nodes))
         order = np.argsort(key, kind="stable")
-        first = np.flatnonzero(np.diff(key[order], prepend=-1))
+        key = key[order]
+        first = np.flatnonzero(np.diff(key, prepend=-1))
         beside = np.full((len(first), 2), -1)
-        beside[:, 0] = owner[order[first]]
+        beside[:, 0] = order[first] // 3
         twice = np.diff(np.append(first, len(key))) == 2
-        beside[twice, 1] = owner[order[first[twice] + 1]]
-        return sides[order[first]], beside
+        beside[twice, 1] = order[first[twice] + 1] // 3
+        return np.stack(np.divmod(key[first], len(self.cloud.nodes)), axis=1), beside
 
     @cached_property
     def inner_edges(self) -> np.ndarray:

@@ -56,6 +56,19 @@ def of_a_march(discretizer: Discretizer, cloud: Cloud) -> Iterator[Any]:
 @needs_numba
 @pytest.mark.parametrize("form", FORMS)
 @pytest.mark.parametrize("name", CLOUDS)
+def test_compiled_products_are_those_of_the_matrices(form: str, name: str) -> None:
+    """Of the matrices and of their magnitudes, for vectors of numbers and of a strided array."""
+    random = np.random.default_rng(4)
+    for operator in of_a_march(FORMS[form], CLOUDS[name]):
+        vector = random.standard_normal((operator.shape[1], 2))[:, 0]
+        for one, matrix in ((operator, operator.tocsr()), (abs(operator), abs(operator.tocsr()))):
+            expected = matrix @ vector
+            np.testing.assert_allclose(one @ vector, expected, rtol=0.0, atol=1e-13 * (abs(matrix) @ abs(vector)).max())
+
+
+@needs_numba
+@pytest.mark.parametrize("form", FORMS)
+@pytest.mark.parametrize("name", CLOUDS)
 def test_compiled_operators_are_numpys(form: str, name: str) -> None:
     discretizer, cloud = FORMS[form], CLOUDS[name]
     compiled_ones = list(of_a_march(discretizer, cloud))
@@ -189,7 +202,7 @@ def test_where_nothing_can_be_kept_it_is_compiled_in_every_process(monkeypatch: 
             raise RuntimeError("cannot cache function: no locator available")
         return lambda function: function
 
-    numba = SimpleNamespace(njit=njit, float64="f8", int64="i8", boolean="b1")
+    numba = SimpleNamespace(njit=njit, int32="i4", float64="f8", int64="i8", boolean="b1")
     monkeypatch.setattr(machine_code, "compiler", lambda: numba)
     assert compiled(ranking.by_insertion, "f0 i0") is ranking.by_insertion
     assert asked == [True, False]

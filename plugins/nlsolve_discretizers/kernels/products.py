@@ -1,0 +1,91 @@
+"""ε̇(v), div v, div s, ∇p : derivatives of a vector field by the weights of ∂/∂x and ∂/∂y, as machine code.
+
+Every weight is read once, where a sparse matrix has it once for each row. T targets, k neighbours each, `near` (T, k),
+weights `both` (2, T, k) [1/mm]; velocities are node-major, strain rates and stresses in blocks xx, yy, xy.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from nlsolve_discretizers.kernels.machine_code import compiled
+
+
+def strain_rate(near: np.ndarray, both: np.ndarray, velocity: np.ndarray) -> np.ndarray:
+    """xx, yy, xy of ½(∇v + ᵗ∇v), (3 T,)."""
+    targets, k = near.shape
+    rates = np.empty(3 * targets)
+    for t in range(targets):
+        xx = yy = uy = vx = 0.0
+        for n in range(k):
+            u, v = velocity[2 * near[t, n]], velocity[2 * near[t, n] + 1]
+            xx += both[0, t, n] * u
+            yy += both[1, t, n] * v
+            uy += both[1, t, n] * u
+            vx += both[0, t, n] * v
+        rates[t], rates[targets + t], rates[2 * targets + t] = xx, yy, 0.5 * uy + 0.5 * vx
+    return rates
+
+
+def divergence(near: np.ndarray, both: np.ndarray, velocity: np.ndarray) -> np.ndarray:
+    """div v, (T,)."""
+    targets, k = near.shape
+    rates = np.empty(targets)
+    for t in range(targets):
+        xx = yy = 0.0
+        for n in range(k):
+            xx += both[0, t, n] * velocity[2 * near[t, n]]
+            yy += both[1, t, n] * velocity[2 * near[t, n] + 1]
+        rates[t] = xx + yy
+    return rates
+
+
+def divergence_of_stress(near: np.ndarray, both: np.ndarray, stress: np.ndarray) -> np.ndarray:
+    """∂xx/∂x + ∂xy/∂y and ∂xy/∂x + ∂yy/∂y, node-major, (2 T,)."""
+    (targets, k), points = near.shape, len(stress) // 3
+    force = np.empty(2 * targets)
+    for t in range(targets):
+        xx = yy = shear_x = shear_y = 0.0
+        for n in range(k):
+            shear = stress[2 * points + near[t, n]]
+            xx += both[0, t, n] * stress[near[t, n]]
+            yy += both[1, t, n] * stress[points + near[t, n]]
+            shear_x += both[0, t, n] * shear
+            shear_y += both[1, t, n] * shear
+        force[2 * t], force[2 * t + 1] = xx + shear_y, shear_x + yy
+    return force
+
+
+def gradient(near: np.ndarray, both: np.ndarray, pressure: np.ndarray) -> np.ndarray:
+    """∂p/∂x and ∂p/∂y, node-major, (2 T,)."""
+    targets, k = near.shape
+    force = np.empty(2 * targets)
+    for t in range(targets):
+        x = y = 0.0
+        for n in range(k):
+            x += both[0, t, n] * pressure[near[t, n]]
+            y += both[1, t, n] * pressure[near[t, n]]
+        force[2 * t], force[2 * t + 1] = x, y
+    return force
+
+
+STRAIN_RATE, DIVERGENCE, DIVERGENCE_OF_STRESS, GRADIENT = range(4)
+
+
+def product(which: int, near: np.ndarray, both: np.ndarray, vector: np.ndarray) -> np.ndarray:
+    """One of the four."""
+    if which == STRAIN_RATE:
+        return strain_rate(near, both, vector)
+    if which == DIVERGENCE:
+        return divergence(near, both, vector)
+    if which == DIVERGENCE_OF_STRESS:
+        return divergence_of_stress(near, both, vector)
+    return gradient(near, both, vector)
+
+
+def machine_code() -> Callable[..., Any] | None:
+    """`product`, compiled; None where there is no compiler."""
+    return compiled(product, "i0 n2c f3c f1c", strain_rate, divergence, divergence_of_stress, gradient)
