@@ -42,9 +42,13 @@ class Cloud:
     @cached_property
     def nearest_distance(self) -> Array:
         """Distance of every node to its nearest neighbour, shape (N,) [mm]."""
-        tree = scipy.spatial.cKDTree(self.nodes, balanced_tree=False, compact_nodes=False)  # quickest for one question
-        distances: Array = tree.query(self.nodes, 2)[0]
+        distances: Array = self.tree.query(self.nodes, 2)[0]
         return distances[:, 1]
+
+    @cached_property
+    def tree(self) -> scipy.spatial.cKDTree:
+        """The tree of the nodes, for whoever looks for the nearest of them."""
+        return scipy.spatial.cKDTree(self.nodes)
 
     @cached_property
     def on_boundary(self) -> NDArray[np.bool_]:

@@ -68,7 +68,8 @@ class CountedProblem(NonlinearProblem):
     def __init__(self, problem: NonlinearProblem, ledger: Ledger, operator: CheckedOperator | None = None) -> None:
         self._problem, self._ledger, self._operator = problem, ledger, operator
         self.operator_is_jacobian = operator is None
-        self._last: tuple[Array, Array] | None = None
+        self._last: tuple[Array, Array] | None = None  # of the method
+        self._judged: tuple[Array, Array] | None = None  # of the driver
         self._scales: dict[bytes, float] = {}
         self.measure: Measure | None = None
         self.is_gradient = problem.is_gradient
@@ -181,7 +182,10 @@ class CountedProblem(NonlinearProblem):
         self.measure, self._scales[start.tobytes()] = measure, measure.absolute
 
     def uncounted_residual(self, u: Array) -> Array:
-        """R(u), (U,), not counted and not timed; reused when the method has evaluated it last at the same state."""
-        if self._last is not None and np.array_equal(u, self._last[0]):
-            return self._last[1]
-        return self._problem.residual(u)
+        """R(u), (U,), not counted and not timed; evaluated once where the method or the driver has asked for it last."""
+        for known in (self._last, self._judged):
+            if known is not None and np.array_equal(u, known[0]):
+                return known[1]
+        residual = self._problem.residual(u)
+        self._judged = u.copy(), residual
+        return residual

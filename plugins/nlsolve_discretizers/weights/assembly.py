@@ -33,6 +33,11 @@ class Gradient:
         """The weights of ∂/∂y, (T, k)."""
         return self.both[Y]
 
+    @cached_property
+    def numbers(self) -> np.ndarray:
+        """The neighbours, in half the memory."""
+        return np.ascontiguousarray(self.near, dtype=np.int32)
+
     def at(self, targets: np.ndarray) -> Gradient:
         """The same at some of the targets."""
         return Gradient(self.near[targets], self.both[:, targets])
@@ -94,7 +99,7 @@ class Unassembled:
 
     @cached_property
     def _matrix(self) -> Any:
-        near, both = self.weights.near, self.weights.both
+        near, both = self.weights.near.astype(np.intp, copy=False), self.weights.both
         return sparse_rows(near, both, self.rows, self.stride, self.shape[1], self.of_target_together)
 
     @cached_property
@@ -103,8 +108,7 @@ class Unassembled:
         code = products.machine_code()
         if code is None:
             return None
-        near, both = self.weights.near.astype(np.int32), np.ascontiguousarray(self.weights.both)
-        return partial(code, self.which, near, both)
+        return partial(code, self.which, self.weights.numbers, np.ascontiguousarray(self.weights.both))
 
     def __matmul__(self, other: Any) -> Any:
         if self._times is not None and isinstance(other, np.ndarray) and other.shape == self.shape[1:]:
@@ -113,7 +117,7 @@ class Unassembled:
         return self._matrix @ entries if isinstance(entries, np.ndarray) or sp.issparse(entries) else NotImplemented
 
     def __abs__(self) -> Unassembled:
-        weights = Gradient(self.weights.near, np.abs(self.weights.both))
+        weights = Gradient(self.weights.numbers, np.abs(self.weights.both))
         return replace(self, weights=weights)  # all factors are positive, and each weight has an entry of its own
 
     def __getattr__(self, name: str) -> Any:

@@ -30,6 +30,7 @@ class Lists:
     index, distance : (T, K), nearest first; −1 for a source that is no more, at an infinite distance.
     reach : (T,) [mm], every source nearer than this is listed.
     count : how many of the nearest are sure to be listed, all sources at most.
+    known_tree : the tree of the sources, where there is one already.
     """
 
     sources: np.ndarray
@@ -38,13 +39,21 @@ class Lists:
     distance: np.ndarray
     reach: np.ndarray
     count: int
+    known_tree: scipy.spatial.cKDTree | None = None
 
     @classmethod
-    def of(cls, sources: np.ndarray, targets: np.ndarray, count: int, spare: int = 0) -> Lists:
+    def of(
+        cls,
+        sources: np.ndarray,
+        targets: np.ndarray,
+        count: int,
+        spare: int = 0,
+        tree: scipy.spatial.cKDTree | None = None,
+    ) -> Lists:
         """The `count` nearest sources, and some to spare."""
         every, listed = np.arange(len(targets)), min(count + spare, len(sources))
         index, distance = np.empty((len(targets), listed), np.intp), np.empty((len(targets), listed))
-        lists = cls(sources, targets, index, distance, np.empty(len(targets)), min(count, len(sources)))
+        lists = cls(sources, targets, index, distance, np.empty(len(targets)), min(count, len(sources)), tree)
         return lists._filled(every, lists.query(listed, every))
 
     def moved(
@@ -53,8 +62,9 @@ class Lists:
         targets: np.ndarray,
         sources_before: np.ndarray | None = None,
         targets_before: np.ndarray | None = None,
+        tree: scipy.spatial.cKDTree | None = None,
     ) -> Lists:
-        """The nearest sources at other places.
+        """The nearest sources at other places, of which there may be a tree.
 
         sources_before, targets_before : the number that each of them had, −1 for new ones; None: the same as now.
         """
@@ -79,7 +89,7 @@ class Lists:
         if sources_before is not None:
             numbers = _numbers_now(sources_before, len(self.sources))
         index, distance = ranked(sources, targets, self.index, rows, numbers)
-        now = Lists(sources, targets, index, distance, reach, self.count)
+        now = Lists(sources, targets, index, distance, reach, self.count, tree)
         which = np.flatnonzero(~(distance[:, self.count - 1] < reach))
         return now._filled(which, now.query(index.shape[1], which, quick=True)) if len(which) else now
 
@@ -103,14 +113,17 @@ class Lists:
 
         quick : by one that is made in half the time, and may have equal distances in another order.
         """
-        tree = scipy.spatial.cKDTree(self.sources, compact_nodes=False, balanced_tree=False) if quick else self.tree
+        if quick and self.known_tree is None:
+            tree = scipy.spatial.cKDTree(self.sources, compact_nodes=False, balanced_tree=False)
+        else:
+            tree = self.tree
         distance, index = tree.query(self.targets[which], np.arange(1, count + 1))
         return distance, index
 
     @cached_property
     def tree(self) -> scipy.spatial.cKDTree:
         """The tree of the sources."""
-        return scipy.spatial.cKDTree(self.sources)
+        return scipy.spatial.cKDTree(self.sources) if self.known_tree is None else self.known_tree
 
 
 def _steps(before: np.ndarray, now: np.ndarray, numbers: np.ndarray | None) -> np.ndarray:

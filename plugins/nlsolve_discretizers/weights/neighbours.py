@@ -47,12 +47,13 @@ class Neighbours:
         """Lists of the `count` nearest sources in a role; None on a cloud whose nodes have not moved."""
         if self.before is None:
             return None
-        earlier = self.before.get(role)
+        earlier, cloud = self.before.get(role), self.triangles.cloud
+        tree = cloud.tree if sources is cloud.nodes else None
         if earlier is None:
-            self.lists[role] = Lists.of(sources, targets, count, SPARE)
+            self.lists[role] = Lists.of(sources, targets, count, SPARE, tree)
         else:
             numbers = {"strain": (None, self.points_before), "force": (self.points_before, None)}
-            self.lists[role] = earlier.moved(sources, targets, *numbers.get(role, (None, None)))
+            self.lists[role] = earlier.moved(sources, targets, *numbers.get(role, (None, None)), tree)
         return self.lists[role]
 
 
