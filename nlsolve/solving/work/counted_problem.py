@@ -182,7 +182,7 @@ class CountedProblem(NonlinearProblem):
         self.measure, self._scales[start.tobytes()] = measure, measure.absolute
 
     def uncounted_residual(self, u: Array) -> Array:
-        """R(u), (U,), not counted and not timed; evaluated once where the method or the driver has asked for it last."""
+        """R(u), (U,), not counted and not timed; not evaluated where the method or the driver has asked for it last."""
         for known in (self._last, self._judged):
             if known is not None and np.array_equal(u, known[0]):
                 return known[1]

@@ -19,16 +19,19 @@ NUMBERS = "fiu"
 
 def checked_step(step: Any, start: Array, solver: NonlinearSolver) -> Step:
     """The step, whose state is a real array of the shape of `start`. Raises TypeError, which names the solver."""
-    name = f"the solver {solver.called()!r}"
+
+    def broken(promise: str) -> TypeError:
+        return TypeError(f"the solver {solver.called()!r} yielded a {promise}")
+
     if not isinstance(step, Step):
-        raise TypeError(f"{name} yielded a {type(step).__name__}, not a Step: yield Step(state)")
+        raise broken(f"{type(step).__name__}, not a Step: yield Step(state)")
     state = step.state
     if not isinstance(state, np.ndarray):
-        raise TypeError(f"{name} yielded a state that is a {type(state).__name__}, not an array of shape {start.shape}")
+        raise broken(f"state that is a {type(state).__name__}, not an array of shape {start.shape}")
     if state.shape != start.shape:
-        raise TypeError(f"{name} yielded a state of shape {state.shape}, not of the shape {start.shape} of its start")
+        raise broken(f"state of shape {state.shape}, not of the shape {start.shape} of its start")
     if state.dtype.kind != REAL:
-        raise TypeError(f"{name} yielded a state of {state.dtype} numbers: states are real, float64; convert it")
+        raise broken(f"state of {state.dtype} numbers: states are real, float64; convert it")
     return step
 
 

@@ -48,7 +48,7 @@ def fit(
     x, y = offsets / radius
     distance = np.sqrt(x * x + y * y)
     w = np.where(distance < 1.0, weight_function(weight, distance, shape), 0.0)
-    unscaled = np.stack([radius ** -float(i + j) for i, j in derivatives])
+    unscaled = np.stack([(1.0 / radius) ** (i + j) for i, j in derivatives])
     phi, smallest = fitted(x, y, w, degree, derivatives, unscaled)
     poor = np.flatnonzero(~(smallest >= SOUND))
     if len(poor):
