@@ -37,6 +37,7 @@ class PointOperators:
 
     rate : B, values at the nodes -> rates at the points, sparse (c P, 2N).
     force : S, stresses there -> force at the interior nodes, sparse (2F, c P).
+        Either may be an object that multiplies vectors and can be read like a sparse matrix, but is assembled later.
     points : places of the points, (P, 2) [mm].
     areas : A, areas of the points, (P,) [mm²]; strain points have them in a conservative form only.
     """
