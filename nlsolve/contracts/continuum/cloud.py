@@ -10,6 +10,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from nlsolve.contracts.continuum.near import Near
 from nlsolve.contracts.status import SolveError, Status
 from nlsolve.series import Array
 
@@ -25,6 +26,8 @@ class Cloud:
 
     nodes: Array
     boundaries: Mapping[str, Indices]
+    near_before: Near | None = field(default=None, repr=False, compare=False)
+    """What was near each of the same nodes before they moved here."""
 
     def __post_init__(self) -> None:
         if not len(self.nodes):
@@ -42,8 +45,15 @@ class Cloud:
     @cached_property
     def nearest_distance(self) -> Array:
         """Distance of every node to its nearest neighbour, shape (N,) [mm]."""
-        distances: Array = self.tree.query(self.nodes, 2)[0]
-        return distances[:, 1]
+        return self.near.distance
+
+    @cached_property
+    def near(self) -> Near:
+        """The nodes that are near each node."""
+        before = self.near_before
+        if before is None or len(before.nodes) != len(self.nodes):
+            return Near.of(self.nodes, self.tree)
+        return before.moved_to(self.nodes, lambda: self.tree)
 
     @cached_property
     def tree(self) -> scipy.spatial.cKDTree:
@@ -70,7 +80,7 @@ class Cloud:
 
     def moved_to(self, nodes: Array) -> Cloud:
         """A cloud with the same groups and other places `nodes` (N, 2) [mm]. Raises SolveError (bad cloud)."""
-        return replace(self, nodes=nodes)
+        return replace(self, nodes=nodes, near_before=self.near)
 
 
 @dataclass(frozen=True)
