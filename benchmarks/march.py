@@ -24,7 +24,16 @@ METHODS: dict[str, dict[str, Any]] = {
     "broyden": {"solver": {"kind": "broyden"}, "refresh": {"kind": "poor-contraction"}},
     "homotopy, p = 20": {"solver": {"kind": "anm", "order": 20, "tolerance": 1e-6}},
 }
-PARTS = ("operators", "triangular_solve", "residual", "series_order", "own", "jacobian", "factorization", "rest")
+PARTS = {
+    "operators": "operators",
+    "solves": "triangular_solve",
+    "residuals": "residual",
+    "series": "series_order",
+    "own": "own",
+    "Jacobians": "jacobian",
+    "factors": "factorization",
+    "rest": "rest",
+}
 
 
 def parts_of(increments: int, method: dict[str, Any]) -> Any:
@@ -55,18 +64,18 @@ def measured(increments: int, method: dict[str, Any]) -> tuple[dict[str, float],
 
     row = run_case(parts_of(increments, method), watch=watch).summary
     first, last = known[0], known[-1]
-    seconds = {part: last.get(part, 0.0) - first.get(part, 0.0) for part in (*PARTS, "method", "all")}
+    seconds = {part: last.get(part, 0.0) - first.get(part, 0.0) for part in (*PARTS.values(), "method", "all")}
     seconds["rest"] = seconds["all"] - seconds["method"] - seconds["operators"]
     return seconds, row
 
 
 def main(increments: int) -> None:
     """Print the table."""
-    print(f"{'':18s}{'all':>8s}" + "".join(f"{part.replace('_', ' '):>18s}" for part in PARTS))
+    print(f"{'':18s}{'all':>8s}" + "".join(f"{title:>11s}" for title in PARTS))
     for name, method in METHODS.items():
         seconds, row = measured(increments, method)
         spent = {part: 1e3 * value / (increments - 1) for part, value in seconds.items()}
-        print(f"{name:18s}{spent['all']:8.1f}" + "".join(f"{spent[part]:18.1f}" for part in PARTS))
+        print(f"{name:18s}{spent['all']:8.1f}" + "".join(f"{spent[part]:11.1f}" for part in PARTS.values()))
         solves = spent["triangular_solve"]
         print(
             f"  {spent['all'] / solves:.2f} times its solves, {spent['all'] / (solves + spent['operators']):.2f} times "

@@ -110,7 +110,7 @@ class Collocation(Discretizer):
             supports = supports.replaced(renew, Supports.nearest(sources, targets[renew], larger))
             found = np.pad(found, ((0, 0), (0, 0), (0, supports.index.shape[1] - found.shape[2])))
             found[:, renew] = 0.0
-        worst = int(np.nan_to_num(quality, nan=0.0).argmin())
+        worst = int(np.fmax(quality, 0.0).argmin())  # of what is not a number 0
         error = self.refusal(int(supports.count[worst]), targets[worst], float(quality[worst]))
         if error is not None:
             raise error
@@ -222,8 +222,10 @@ def _batches(counts: np.ndarray, targets: np.ndarray) -> Iterator[tuple[int, np.
     """Number of neighbours, and at most AT_ONCE of the `targets` (indices) that have so many, batch by batch; a slice
     where they follow one another, so that nothing is copied.
     """
-    for count in np.unique(counts[targets]):
-        alike = targets[counts[targets] == count]
+    asked = counts[targets]
+    uniform = bool((asked == asked[:1]).all())
+    for count in asked[:1] if uniform else np.unique(asked):
+        alike = targets if uniform else targets[asked == count]
         for begin in range(0, len(alike), AT_ONCE):
             which = alike[begin : begin + AT_ONCE]
             first, last = int(which[0]), int(which[-1])

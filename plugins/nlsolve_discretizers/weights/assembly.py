@@ -40,7 +40,7 @@ class Gradient:
 
     def at(self, targets: np.ndarray) -> Gradient:
         """The same at some of the targets."""
-        return Gradient(self.near[targets], self.both[:, targets])
+        return Gradient(self.near.take(targets, axis=0), self.both.take(targets, axis=1))
 
     def matrices(self, sources: int) -> tuple[Any, Any]:
         """Sparse (T, sources) matrices."""
