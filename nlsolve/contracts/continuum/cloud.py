@@ -26,7 +26,7 @@ class Cloud:
 
     nodes: Array
     boundaries: Mapping[str, Indices]
-    near_before: Near | None = field(default=None, repr=False, compare=False)
+    near_before: Near | None = field(default=None, repr=False, compare=False, kw_only=True)
     """What was near each of the same nodes before they moved here."""
 
     def __post_init__(self) -> None:
