@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import scipy.sparse as sp
 from clouds import CLOUDS, jittered_points
 from nlsolve_discretizers import LinearTriangles, MovingLeastSquares, RadialBasis, kernels
 from nlsolve_discretizers.kernels import machine_code, normal_equations, quadrants, ranking, rows
@@ -64,6 +65,39 @@ def test_compiled_products_are_those_of_the_matrices(form: str, name: str) -> No
         for one, matrix in ((operator, operator.tocsr()), (abs(operator), abs(operator.tocsr()))):
             expected = matrix @ vector
             np.testing.assert_allclose(one @ vector, expected, rtol=0.0, atol=1e-13 * (abs(matrix) @ abs(vector)).max())
+
+
+def test_an_operator_that_is_not_assembled_is_read_and_combined_like_a_matrix() -> None:
+    operator = MovingLeastSquares().operators(next(iter(CLOUDS.values())), False).strain.rate
+    matrix = operator.tocsr()
+    rows, columns = np.arange(operator.shape[0]), np.ones((operator.shape[1], 2))
+    for one, other in (
+        (operator[:3], matrix[:3]),
+        (operator.T, matrix.T),
+        (-operator, -matrix),
+        (2.0 * operator, 2.0 * matrix),
+        (operator + operator, 2.0 * matrix),
+        (operator - operator, 0.0 * matrix),
+        (matrix - operator, 0.0 * matrix),
+        (sp.diags_array(rows + 1.0) @ operator, sp.diags_array(rows + 1.0) @ matrix),
+        (operator @ sp.eye_array(operator.shape[1]), matrix),
+    ):
+        assert abs(one - other).max() == 0.0
+    np.testing.assert_array_equal(operator @ columns, matrix @ columns)
+    np.testing.assert_array_equal(rows @ operator, rows @ matrix)
+    assert operator.nnz == matrix.nnz
+    with pytest.raises(AttributeError, match="nothing"):
+        operator.nothing  # noqa: B018
+
+
+def test_weights_times_factors() -> None:
+    random = np.random.default_rng(5)
+    x, y, factors = random.standard_normal((12, 7)), random.standard_normal((12, 7)), random.random((2, 7))
+    given = x, y, np.ones((12, 7)), 2, ((1, 0), (0, 1))
+    phi, smallest = normal_equations.fitted(*given)
+    times, same = normal_equations.fitted(*given, factors)
+    np.testing.assert_allclose(times, factors[:, None] * phi, rtol=1e-12)
+    np.testing.assert_array_equal(smallest, same)
 
 
 @needs_numba

@@ -10,6 +10,7 @@ import scipy.sparse as sp
 
 from nlsolve import SolveError, Status
 from nlsolve.plugin import Expansion, NonlinearProblem, Series, cached_jacobian
+from nlsolve.series import Array
 from nlsolve.solving.work.counted_matrix import CountedMatrix
 from nlsolve.solving.work.counted_problem import CountedProblem
 from nlsolve.solving.work.ledger import Ledger
@@ -184,3 +185,20 @@ def test_the_check_of_problems_takes_one_without_a_series() -> None:
         expand = NonlinearProblem.expand  # type: ignore[assignment]
 
     check_problem(Plain(), START)
+
+
+def test_the_driver_evaluates_a_residual_once_and_not_where_the_method_has(ledger: Ledger) -> None:
+    evaluated: list[float] = []
+
+    class Told(ToyProblem):
+        def residual(self, u: Array) -> Array:
+            evaluated.append(float(u[0]))
+            return super().residual(u)
+
+    problem = CountedProblem(Told(), ledger)
+    for state in (START, START.copy(), 2.0 * START):
+        np.testing.assert_array_equal(problem.uncounted_residual(state), ToyProblem().residual(state))
+    problem.residual(3.0 * START)
+    problem.uncounted_residual(3.0 * START)
+    assert evaluated == [START[0], 2.0 * START[0], 3.0 * START[0]]
+    assert ledger.counts["residual"] == 1
