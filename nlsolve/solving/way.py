@@ -1,7 +1,7 @@
 """The way to a first state, which many cases share: solved by one of them, and taken by the others.
 
 A case takes a recorded outcome instead of solving when its problem begins at the same start, is prepared in the same
-manner, and has as small a residual at the recorded state. Whatever else differs, it solves for itself from there on.
+manner, and has the same residual at the recorded state. Whatever else differs, it solves for itself from there on.
 """
 
 from __future__ import annotations
@@ -25,8 +25,8 @@ from nlsolve.solving.stopping import Budget, StoppingTest
 from nlsolve.solving.tangent import Tangent
 from nlsolve.solving.work.ledger import Ledger
 
-ROUNDING = 2.0
-"""Growth of a recorded residual that rounding explains on another machine."""
+ROUNDING = 1e-8
+"""Largest change of a relative residual, solved to a tolerance as loose as may be, that another machine explains."""
 
 
 @dataclass(frozen=True)
@@ -57,7 +57,8 @@ class Stretch:
         if self.outcome.status is not Status.CONVERGED:
             return True
         norm = float(np.linalg.norm(task.problem.residual(self.outcome.state))) / task.problem.scale(task.start)
-        return norm <= max(task.preparation.tolerance, ROUNDING * self.outcome.residual_norm)
+        recorded = self.outcome.residual_norm
+        return abs(norm - recorded) <= min(max(task.preparation.tolerance, recorded), ROUNDING)
 
 
 @dataclass(frozen=True)
