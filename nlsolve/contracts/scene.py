@@ -24,6 +24,7 @@ from nlsolve.contracts.component import Component
 from nlsolve.contracts.nonlinear_solver import NonlinearSolver
 from nlsolve.contracts.outcome import Outcome
 from nlsolve.contracts.problem import NonlinearProblem
+from nlsolve.contracts.rules.refresh import RefreshRule
 from nlsolve.series import Array
 
 
@@ -37,14 +38,16 @@ class Entry(Protocol):
 class Preparation:
     """How a problem on the way to the first state is solved; the work is counted apart from that of the case's method.
 
-    solver : the method, which gets a new tangent K* at each iteration.
+    solver : the method.
     tolerance : largest relative residual accepted.
     iterations : steps allowed.
+    refresh : when K* is renewed; None: at each iteration. A solve after another one with the same rule keeps its K*.
     """
 
     solver: NonlinearSolver
     tolerance: float
     iterations: int
+    refresh: RefreshRule | None = None
 
 
 @dataclass(frozen=True)

@@ -10,6 +10,7 @@ import numpy as np
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from nlsolve.contracts.continuum.law import ConstitutiveLaw
+from nlsolve.contracts.nonlinear_solver import NonlinearSolver
 from nlsolve.contracts.outcome import Outcome
 from nlsolve.contracts.recording import SystemStart
 from nlsolve.contracts.scene import Preparation, Solve
@@ -23,6 +24,9 @@ LOAD = "load"
 
 REST = "rest"
 """The value of `at` with which a march begins at rest."""
+
+VALUES = (1.0, 0.5, 0.3, 0.2)
+"""The values of a continuation for which a study gives none."""
 
 CONTINUATION = ("by", "values", "adaptive", "smallest", "iterations", "tolerance", "solver")
 """The fields of a `Start` that say how its stages are solved; a march from rest has none."""
@@ -52,6 +56,10 @@ class Start(SystemStart):
     in steps of log(`by`), which are halved when a stage fails and doubled when it was easy. With no values, the method
     of the case solves a steady scene from rest.
 
+    A march and adaptive nodes need no stages where at most a tolerance is given: Newton's method solves the flow by
+    linear triangles on the same nodes from rest, and from there Newton-Krylov with a kept tangent solves that of the
+    case. The continuation follows where this fails.
+
     A march may also begin at rest: V = 0 inside at t = 0, on the boundary what is prescribed there, and nothing is
     solved before the first increment. What that costs is counted in the march; all `start_…` columns are 0.
 
@@ -71,7 +79,9 @@ class Start(SystemStart):
         "index",
         description="what is varied: a field of the law, as index (from 1) or regularization (from large), or load",
     )
-    values: tuple[float, ...] = Field((1.0, 0.5, 0.3, 0.2), description="its values on the way, in order")
+    values: tuple[float, ...] | None = Field(
+        None, description=f"its values on the way, in order; absent: {', '.join(f'{value:g}' for value in VALUES)}"
+    )
     adaptive: bool = Field(False, description="find the values between the first and the target")
     smallest: float = Field(0.01, gt=0, lt=1, description="adaptive: shortest step, as part of the way in log(by)")
     iterations: int = Field(25, gt=0, description="adaptive: iterations after which a stage has failed")
@@ -101,6 +111,18 @@ class Start(SystemStart):
                     raise ValueError(f"{name}: a march from {begun} has no continuation: leave it out, or {way_out}")
         return self
 
+    @property
+    def path(self) -> tuple[float, ...]:
+        """`values`, or `VALUES` where a study gives none."""
+        return VALUES if self.values is None else self.values
+
+    @property
+    def is_free(self) -> bool:
+        """Whether a study says nothing of how its first state is reached, so that any way there is as good."""
+        usual = Start()
+        said = (*(name for name in CONTINUATION if name != "tolerance"), "at", "stored")
+        return all(getattr(self, name) == getattr(usual, name) for name in said)
+
     def disturbed(self, flow: Flow, u: Array, increment: int) -> Array:
         """u + ε ‖V‖₂ g/‖g‖₂ with V the velocities of all nodes and g normal, drawn anew for each increment."""
         if not self.perturbation:
@@ -119,16 +141,16 @@ class Start(SystemStart):
         if self.stored is not None:
             return [Stage(law, 1.0, 1.0)]
         if self.by == LOAD:
-            path = (*self.values, 1.0)
+            path = (*self.path, 1.0)
             if min(path) <= 0.0 or (np.diff(path) <= 0.0).any():
                 raise ValueError(
-                    f"start.values = {list(self.values)}: a load grows to 1: give increasing values between 0 and 1, "
+                    f"start.values = {list(self.path)}: a load grows to 1: give increasing values between 0 and 1, "
                     "such as [1e-4, 1e-2]"
                 )
             return [Stage(law, load, load) for load in path]
-        if not self.values and self.by not in law.continued_by:  # there is nothing to continue by
+        if not self.path and self.by not in law.continued_by:  # there is nothing to continue by
             return [Stage(law, 1.0, 1.0)]
-        stages = [Stage(each, 1.0, getattr(each, self.by)) for each in law.continuation(self.by, self.values)]
+        stages = [Stage(each, 1.0, getattr(each, self.by)) for each in law.continuation(self.by, self.path)]
         if self.adaptive and not min(stage.value for stage in stages) > 0.0:
             raise ValueError(
                 f"start.by = {self.by!r}: an adaptive continuation steps in its logarithm, and the law's is "
@@ -140,6 +162,11 @@ class Start(SystemStart):
         """How one stage is solved: by the method of the start, in at most this many iterations, or fewer of its own."""
         most = min(self.iterations, iterations) if self.adaptive else iterations
         return Preparation(self.solver, self.tolerance, most)
+
+    def method(self, flow: Flow) -> NonlinearSolver:
+        """The method of the start, with steps by the potential of a flow that has one, if the method can take them."""
+        can = flow.is_gradient and "globalization" in type(self.solver).model_fields
+        return self.solver.with_(globalization={"kind": "energy"}) if can else self.solver
 
     def between(self, first: Stage, target: Stage, part: float) -> Stage:
         """The stage at log-interpolated `by`; part = 0: first, part = 1: target."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Generator, Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -19,6 +19,7 @@ from nlsolve.flow.accuracy.enrichment import carried
 from nlsolve.flow.accuracy.estimate import NOTHING_TO_COMPARE, UNKNOWN, Comparison, compared
 from nlsolve.flow.claims.units import SMALL, WAY_OUT
 from nlsolve.flow.continuation import REST, Solves, Stage, walk
+from nlsolve.flow.first_state.descent import arrival, descent, may_descend
 from nlsolve.flow.incompressibility import iterate_pressure
 from nlsolve.flow.momentum import Flow
 from nlsolve.flow.motion.markers import Markers
@@ -131,12 +132,12 @@ class FlowSimulation(Simulation):
                 return iterate_pressure(state, lambda: self.prepare(stage))
             return iterate_pressure(state, lambda: self.increment(0, state.flow_of(stage.law)))
 
-        outcome, stage = yield from walk(parts.start, parts.law, solve_stage)
+        outcome, stage = yield from self.approach(solve_stage)
         while self.adaptation is not None and outcome.status is Status.CONVERGED and self.adapt(self.adaptation):
             outcome = yield from solve_stage(stage, True)
             if outcome.status is not Status.CONVERGED:  # the state of the last cloud is no start for this one
-                state.velocity = state.guess = np.zeros_like(state.cloud.nodes)
-                outcome, stage = yield from walk(parts.start, parts.law, solve_stage)
+                state.to_rest()
+                outcome, stage = yield from self.approach(solve_stage)
         if self.adaptation is not None and outcome.status is Status.CONVERGED:
             outcome = yield from iterate_pressure(state, lambda: self.increment(0, state.flow_of(parts.law)))
             if outcome.status is Status.CONVERGED and not self.adaptation.reached:
@@ -149,6 +150,21 @@ class FlowSimulation(Simulation):
             detail = f"on the way to the first state, at {parts.start.by} = {stage.value:g}: {outcome.detail}"
             return replace(outcome, detail=detail)
         return outcome
+
+    def approach(
+        self, solve_stage: Callable[[Stage, bool], Solves]
+    ) -> Generator[Solve, Outcome, tuple[Outcome, Stage]]:
+        """From rest to the first state: by descent where any way serves that the case's own method takes no part in,
+        else, and where that fails, stage after stage.
+        """
+        parts, state = self.parts, self.state
+        stages = parts.start.stages(parts.law)
+        if (self.increments or self.adaptation is not None) and may_descend(parts, stages):
+            outcome = yield from descent(state)
+            if outcome.status is Status.CONVERGED:
+                return outcome, stages[-1]
+            state.to_rest()
+        return (yield from walk(parts.start, parts.law, solve_stage))
 
     def adapt(self, adaptation: Adaptation) -> bool:
         """Estimate the error of the state, and carry it to a cloud for the error asked for; False where that is reached
@@ -202,10 +218,13 @@ class FlowSimulation(Simulation):
 
     def prepare(self, stage: Stage) -> Solves:
         """Yields the problem of one stage on the way to the first state. On a cloud made from a solution it may take
-        all iterations of the budget: to go all the way again costs more.
+        all iterations of the budget, for to go all the way again costs more, and where the way is left open it is
+        solved as at the end of a descent.
         """
-        flow = self.state.flow_of(stage.law, load=stage.load)
         most = self.parts.budget.iterations
+        if self.adaptation is not None and self.adaptation.rounds and self.parts.start.is_free:
+            return (yield from arrival(self.state, most))
+        flow = self.state.flow_of(stage.law, load=stage.load)
         preparation = self.parts.start.preparation(most)
         if self.adaptation is not None and self.adaptation.rounds:
             preparation = replace(preparation, iterations=most)

@@ -56,9 +56,7 @@ class FlowScene(Geometry, Scene, ABC):
         """All sections but those of the method, of increments, and of what is recorded."""
         if self.adaptive is not None:
             return (*WAY, "error_estimator")
-        leads = parts.start.at != REST and (
-            parts.time.increments or (parts.start.values and parts.start.stored is None)
-        )
+        leads = parts.start.at != REST and (parts.time.increments or (parts.start.path and parts.start.stored is None))
         return WAY if leads else ()
 
     def check(self, parts: Any) -> None:

@@ -88,6 +88,11 @@ class FlowState:
         self.build_operators()
         self.velocity = self.guess = np.zeros_like(cloud.nodes)
 
+    def to_rest(self) -> None:
+        """Forget what has been solved: the next solve begins at rest."""
+        self.velocity = self.guess = np.zeros_like(self.cloud.nodes)
+        self.flow = None
+
     def carry_to(self, cloud: Cloud, carry: Callable[[Array], Array]) -> None:
         """Go on with other nodes at the same time; velocity and pressure are carried there. May raise SolveError.
 
@@ -181,6 +186,15 @@ class FlowState:
             self.drift,
             self.others,
         )
+
+    def discretized_by(self, discretizer: Discretizer) -> FlowState:
+        """This flow on the same nodes by another discretizer, without a pressure. May raise SolveError (bad cloud)."""
+        there = copy(self)
+        if discretizer not in self.others:
+            with self.entry("operators"):
+                self.others[discretizer] = discretizer.operators(self.cloud, self.volumetric)
+        there.operators, there.pressure, there.others = self.others[discretizer], None, {}
+        return there
 
     def enriched(self, finer: Finer, discretizer: Discretizer, velocity: Array) -> FlowState:
         """This flow, solved last with `velocity` (N, 2), on a finer cloud by a discretizer that may be another one.

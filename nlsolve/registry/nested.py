@@ -17,6 +17,7 @@ from nlsolve.contracts.nonlinear_solver import NonlinearSolver
 from nlsolve.contracts.rules.globalization import Globalization
 from nlsolve.contracts.rules.homotopy_form import HomotopyForm
 from nlsolve.contracts.rules.range_rule import RangeRule
+from nlsolve.contracts.rules.refresh import RefreshRule
 from nlsolve.registry.registry import registry_in_use
 
 CONTRACT, BY_NAME = "x-contract", "x-by-name"
@@ -46,6 +47,9 @@ Globalized = Annotated[SerializeAsAny[Globalization], installed(Globalization), 
 
 AnySolver = Annotated[SerializeAsAny[NonlinearSolver], installed(NonlinearSolver), described(NonlinearSolver)]
 """The type of a field that holds a nonlinear solver."""
+
+AnyRefresh = Annotated[SerializeAsAny[RefreshRule], installed(RefreshRule), described(RefreshRule)]
+"""The type of a field that holds a refresh rule."""
 
 AnyRange = Annotated[
     SerializeAsAny[RangeRule],

@@ -1,7 +1,7 @@
 """The way to a first state, which many cases share: solved by one of them, and taken by the others.
 
 A case takes a recorded outcome instead of solving when its problem begins at the same start, is prepared in the same
-manner, and has as small a residual at the recorded state. Whatever else differs, it solves for itself from there on.
+manner, and has the same residual at the recorded state. Whatever else differs, it solves for itself from there on.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ import numpy as np
 
 from nlsolve.contracts.linear_solver import Factors, LinearSolver
 from nlsolve.contracts.outcome import Outcome
+from nlsolve.contracts.rules.refresh import RefreshRule
 from nlsolve.contracts.scene import Preparation, Solve
 from nlsolve.contracts.status import STOPPED, SolveError, Status
 from nlsolve.series import Array
@@ -24,8 +25,8 @@ from nlsolve.solving.stopping import Budget, StoppingTest
 from nlsolve.solving.tangent import Tangent
 from nlsolve.solving.work.ledger import Ledger
 
-ROUNDING = 2.0
-"""Growth of a recorded residual that rounding explains on another machine."""
+ROUNDING = 1e-8
+"""Largest change of a relative residual, solved to a tolerance as loose as may be, that another machine explains."""
 
 
 @dataclass(frozen=True)
@@ -56,7 +57,8 @@ class Stretch:
         if self.outcome.status is not Status.CONVERGED:
             return True
         norm = float(np.linalg.norm(task.problem.residual(self.outcome.state))) / task.problem.scale(task.start)
-        return norm <= max(task.preparation.tolerance, ROUNDING * self.outcome.residual_norm)
+        recorded = self.outcome.residual_norm
+        return abs(norm - recorded) <= min(max(task.preparation.tolerance, recorded), ROUNDING)
 
 
 @dataclass(frozen=True)
@@ -76,6 +78,7 @@ class Walk:
 
     def __init__(self, linear: LinearSolver, ledger: Ledger, way: Way, share: Callable[[Way], None]) -> None:
         self.ledger, self._linear, self._share = ledger, linear, share
+        self._kept_for: tuple[RefreshRule | None, int] = (None, 0)
         self._tangent = Tangent(linear, None, ledger)
         self._known, self._walked, self._is_news = way.stretches, list[Stretch](), False
         self._last: Solve | None = None
@@ -97,6 +100,7 @@ class Walk:
         assert task.preparation is not None
         stop = StoppingTest(kind="residual", tolerance=task.preparation.tolerance)
         budget = Budget(iterations=task.preparation.iterations)
+        self._keep_for(task.preparation.refresh, len(task.start))
         begun = self.ledger.copy()
         with self.ledger.entry("stage"):
             outcome = solve(task.problem, task.preparation.solver, self._tangent, task.start, stop, budget, self.ledger)
@@ -105,6 +109,14 @@ class Walk:
             self._walked.append(stretch)
             self._is_news = True
         return stretch
+
+    def _keep_for(self, rule: RefreshRule | None, size: int) -> None:
+        """Keep K* as long as the rule and the number of unknowns stay; with another rule no ordering is taken over."""
+        before = self._kept_for
+        self._kept_for = rule, 0 if rule is None else size
+        if self._kept_for != before:
+            pattern = self._tangent.factors if rule == before[0] else None
+            self._tangent = Tangent(self._linear, rule, self.ledger, pattern)
 
     def end(self) -> None:
         """The way has ended, at the first state or before it."""
@@ -131,4 +143,6 @@ def _bytes(state: Array) -> bytes:
 
 def _words(preparation: Preparation) -> str:
     solver = preparation.solver
-    return f"{type(solver).__qualname__} {solver.model_dump_json()} {preparation.tolerance} {preparation.iterations}"
+    rule = "" if preparation.refresh is None else preparation.refresh.model_dump_json()
+    said = f"{type(solver).__qualname__} {solver.model_dump_json()} {preparation.tolerance} {preparation.iterations}"
+    return f"{said} {rule}"

@@ -7,7 +7,7 @@ from collections.abc import Iterable
 import numpy as np
 
 from nlsolve.contracts.continuum.law import CONTRACTION, ConstitutiveLaw, stress
-from nlsolve.flow.continuation import Start
+from nlsolve.flow.continuation import VALUES, Start
 from nlsolve.series import Series
 from nlsolve.testing.kit.verdicts import promise
 from nlsolve.testing.promises import ORDER, PARTS, check_coefficients, require, same
@@ -69,9 +69,9 @@ def _check_continuation(law: ConstitutiveLaw) -> None:
     """A study begins by the values of `Start`; a law that no field continues begins at rest, with `values = []`."""
     for by in law.continued_by:
         try:
-            law.continuation(by, Start().values)
+            law.continuation(by, VALUES)
         except ValueError as error:  # a ValidationError is one
             told = str(error).replace("\n", "; ")
-            raise AssertionError(f"continued by {by!r}, the law refuses {Start().values}: {told}") from error
+            raise AssertionError(f"continued by {by!r}, the law refuses {VALUES}: {told}") from error
     if not law.continued_by:
         Start(values=()).stages(law)

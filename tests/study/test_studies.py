@@ -78,7 +78,7 @@ class TestCases:
         assert parameters["scene.nodes.kind"] == "even"
         assert parameters["scene.nodes.count"] == 4
         assert parameters["record.times"] == "[0.5]"
-        assert parameters["start.values"] == "[1.0, 0.5, 0.3, 0.2]"
+        assert parameters["start.values"] is None
 
     def test_identity_follows_from_the_components_only(self, tmp_path):
         first = read(tmp_path)

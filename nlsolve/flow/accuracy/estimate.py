@@ -26,7 +26,6 @@ import numpy as np
 from nlsolve.contracts.continuum.cloud import Cloud
 from nlsolve.contracts.continuum.discretizer import Discretizer
 from nlsolve.contracts.linear_solver import Factors, LinearSolver
-from nlsolve.contracts.nonlinear_solver import NonlinearSolver
 from nlsolve.contracts.status import SolveError, Status
 from nlsolve.flow.accuracy.enrichment import Completed, Finer, enriched, twice_as_fine
 from nlsolve.flow.accuracy.kept_factors import KeptFactors
@@ -136,7 +135,7 @@ def _solved(flow: Flow, start: Array, state: FlowState, work: Ledger) -> Array:
     last, forces = start, np.linalg.norm(flow.residual(start))
     if forces <= SOLVED * flow.scale(start):
         return start
-    for step in islice(_method(flow, state).steps(problem, tangent, start), 1, MOST_STEPS + 1):
+    for step in islice(state.parts.start.method(flow).steps(problem, tangent, start), 1, MOST_STEPS + 1):
         u = step.state.copy()
         if not np.isfinite(u).all():
             break
@@ -146,10 +145,3 @@ def _solved(flow: Flow, start: Array, state: FlowState, work: Ledger) -> Array:
             return u
         last = u
     raise SolveError(Status.BUDGET_SPENT, f"Newton does not solve the flow in {MOST_STEPS} steps with twice the nodes")
-
-
-def _method(flow: Flow, state: FlowState) -> NonlinearSolver:
-    """The method that solves first states, with steps by the potential if there is one and the method can."""
-    solver = state.parts.start.solver
-    can = flow.is_gradient and "globalization" in type(solver).model_fields
-    return solver.with_(globalization={"kind": "energy"}) if can else solver

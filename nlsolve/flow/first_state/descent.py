@@ -1,0 +1,81 @@
+"""To the first state without continuation, by linear triangles on the same nodes:
+
+    Φ(v) → min     R_Δ = ∇Φ by linear triangles; Newton's steps from rest, along each of which Φ falls
+    R(v) = 0       by the case's discretizer, from there; Newton-Krylov with a kept K*
+
+Φ is convex, so that the first line cannot fail, and no other matrix of these nodes is as cheap. Its solution is an
+error of discretisation away from that of the second line, which one K* reaches as a rule. Where convection leaves R_Δ
+without a potential, ‖R_Δ‖ falls instead.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from pydantic import TypeAdapter
+
+from nlsolve.contracts.continuum.discretizer import Discretizer
+from nlsolve.contracts.nonlinear_solver import NonlinearSolver
+from nlsolve.contracts.outcome import Outcome
+from nlsolve.contracts.rules.refresh import RefreshRule
+from nlsolve.contracts.scene import Preparation, Solve
+from nlsolve.contracts.status import SolveError, Status
+from nlsolve.flow.continuation import Solves, Stage
+from nlsolve.flow.incompressibility import iterate_pressure
+from nlsolve.flow.momentum import Flow
+from nlsolve.flow.state import FlowParts, FlowState
+from nlsolve.registry.nested import AnyDiscretizer, AnyRefresh, AnySolver
+
+TOLERANCES = (1e-2, 1e-6)
+"""‖R_Δ‖ over its forces at rest, and then over those of the flow that this has led to, which may be far smaller."""
+
+MOST = 60
+"""Iterations of one solve, after which this way is given up for the continuation."""
+
+TRIANGLES: TypeAdapter[Discretizer] = TypeAdapter(AnyDiscretizer)
+METHOD: TypeAdapter[NonlinearSolver] = TypeAdapter(AnySolver)
+RULE: TypeAdapter[RefreshRule] = TypeAdapter(AnyRefresh)
+"""They look up the discretizer, the method and its rule when a way begins: plugins may still be being imported now."""
+
+
+def may_descend(parts: FlowParts, stages: list[Stage]) -> bool:
+    """Whether a study leaves open how its first state is reached, and this state does not depend on that: a penalty in
+    units of the local viscosity does. One stage is solved as it is.
+    """
+    return parts.start.is_free and len(stages) > 1 and parts.physics.penalty_unit != "local"
+
+
+def descent(state: FlowState) -> Solves:
+    """Yields the problems of the way from rest; the outcome of the last. It has failed where the nodes carry no
+    triangles.
+    """
+    parts = state.parts
+    most = min(MOST, parts.budget.iterations)
+    target = state.flow_of(parts.law)
+    try:
+        easier = by_triangles(state, target)
+    except SolveError as refusal:
+        return Outcome(refusal.status, refusal.detail, np.zeros(0), np.nan)
+    for tolerance in TOLERANCES:
+        preparation = Preparation(parts.start.method(easier), tolerance, most)
+        outcome = yield Solve(easier, easier.unknowns(state.guess), preparation=preparation)
+        if outcome.status is not Status.CONVERGED:
+            return outcome
+    return (yield from iterate_pressure(state, lambda: arrival(state, most)))
+
+
+def by_triangles(state: FlowState, target: Flow) -> Flow:
+    """The flow by linear triangles: `target` itself where these are the case's. May raise SolveError (bad cloud)."""
+    triangles = TRIANGLES.validate_python({"kind": "delaunay"})
+    if state.discretizer == triangles:
+        return target
+    return state.discretized_by(triangles).flow_of(state.parts.law)
+
+
+def arrival(state: FlowState, most: int) -> Solves:
+    """Yields the flow with the state so far for its start, which is near the solution."""
+    flow, start = state.flow_of(state.parts.law), state.parts.start
+    solver = METHOD.validate_python({"kind": "newton-krylov"})
+    refresh = RULE.validate_python(solver.default_refresh)
+    return (
+        yield Solve(flow, flow.unknowns(state.guess), preparation=Preparation(solver, start.tolerance, most, refresh))
+    )
