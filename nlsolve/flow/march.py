@@ -159,12 +159,16 @@ class FlowSimulation(Simulation):
         """
         parts, state = self.parts, self.state
         stages = parts.start.stages(parts.law)
-        if (self.increments or self.adaptation is not None) and may_descend(parts, stages):
+        if self.descends(stages):
             outcome = yield from descent(state)
             if outcome.status is Status.CONVERGED:
                 return outcome, stages[-1]
             state.to_rest()
         return (yield from walk(parts.start, parts.law, solve_stage))
+
+    def descends(self, stages: list[Stage]) -> bool:
+        """Whether the first state is reached without the stages of a continuation."""
+        return (self.increments > 0 or self.adaptation is not None) and may_descend(self.parts, stages)
 
     def adapt(self, adaptation: Adaptation) -> bool:
         """Estimate the error of the state, and carry it to a cloud for the error asked for; False where that is reached
@@ -331,10 +335,11 @@ class FlowSimulation(Simulation):
         return state.flow_of(parts.law), u
 
     def workload(self) -> Workload:
-        """Increments, clouds that are discretised, and stages of the continuation."""
+        """Increments, clouds that are discretised, and stages of the continuation; a descent costs as much as one."""
         increments = max(1, self.increments)
         clouds = 1 + (increments if self.parts.motion.moving else 0)
-        return Workload(increments, clouds, len(self.parts.start.stages(self.parts.law)))
+        stages = self.parts.start.stages(self.parts.law)
+        return Workload(increments, clouds, 1 if self.descends(stages) else len(stages))
 
     def diagnostics(self) -> list[dict[str, Any]]:
         """One row for each operator of the cloud at t = 0 on its quality, or one with the reason why there is none."""

@@ -201,8 +201,13 @@ def test_a_march_in_python_has_the_state_of_rest_first() -> None:
 
 def test_there_are_no_stages_to_forecast() -> None:
     case = marching(5)
-    assert FlowSimulation(case, Ledger().entry).workload().stages == 0
-    assert FlowSimulation(replace(case, start=Start()), Ledger().entry).workload().stages == 3  # n = 1, 0.5 and 0.3
+
+    def stages(start: Start) -> int:
+        return FlowSimulation(replace(case, start=start), Ledger().entry).workload().stages
+
+    assert stages(case.start) == 0
+    assert stages(Start(values=(1.0, 0.5))) == 3  # n = 1, 0.5 and 0.3
+    assert stages(Start()) == 1  # the descent
     problem, u = FlowSimulation(case, Ledger().entry).sample()
     assert np.isfinite(problem.residual(u)).all()
     study = nlsolve.Study.from_dict(
