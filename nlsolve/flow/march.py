@@ -29,6 +29,10 @@ from nlsolve.flow.validity import audit
 from nlsolve.series import Array
 
 
+UNSOLVED = (Status.BUDGET_SPENT, Status.STAGNATED, Status.DIVERGED)
+"""Of iterations that have not arrived."""
+
+
 class FlowSimulation(Simulation):
     """The flow of one case: a quasi-static first state reached by continuation, or rest, then time steps by implicit
     Euler.
@@ -63,7 +67,14 @@ class FlowSimulation(Simulation):
             if outcome.status is not Status.CONVERGED:
                 break
             outcome = yield from self.advance(k)
-        return outcome
+        return self.advised(outcome)
+
+    def advised(self, outcome: Outcome) -> Outcome:
+        """The outcome, with the advice of the discretizer where no iteration has arrived."""
+        if outcome.status not in UNSOLVED:
+            return outcome
+        advice = self.parts.discretizer.advice(self.parts.law, self.parts.scene.reference_rate)
+        return replace(outcome, detail="; ".join(filter(None, (outcome.detail, advice))))
 
     def keep(self, solve: Solve, state: Array) -> Mapping[str, float]:
         """Keep a solved state (2F,); returns the drift of accumulated strain rates, and place and velocity of the

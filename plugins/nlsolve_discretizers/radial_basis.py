@@ -59,6 +59,16 @@ class RadialBasis(Collocation):
             return self
         return self.with_(form="conservative" if local_index(law, rate) < LEAST_STRONG else "strong")
 
+    def advice(self, law: ConstitutiveLaw, rate: float) -> str:
+        """To leave the form open, where a strong one was asked for at an index for which it has no use."""
+        index = local_index(law, rate)
+        if self.form != "strong" or index >= LEAST_STRONG:
+            return ""
+        return (
+            f"the strong form of radial basis functions has an indefinite tangent at an index of {index:g}: leave "
+            'discretizer.form out, or set it to "conservative"'
+        )
+
     def neighbour_count(self, role: str) -> int:
         """As many for every role."""
         return self.support or 2 * least_count(self.degree)

@@ -113,6 +113,12 @@ class Discretizer(Component, ABC):
         """This discretizer, with what it leaves open chosen for a law at strain rates of about `rate` [1/s]."""
         return self
 
+    def advice(self, law: ConstitutiveLaw, rate: float) -> str:
+        """What to choose instead of this discretizer's own settings where no method has solved the flow of a law at
+        strain rates of about `rate` [1/s]; empty: nothing to say.
+        """
+        return ""
+
     def compiled_by(self) -> str | None:
         """What compiled the code that builds the operators, e.g. "numba 0.68.1"; asking loads it."""
         return None

@@ -173,7 +173,7 @@ def test_the_form_that_is_absent_follows_the_index(index: float, form: str) -> N
 
 
 def test_small_indices_are_solved_by_the_default_form_and_not_by_the_strong_one() -> None:
-    """The row says which form it was."""
+    """The row says which form it was, and where it fails what to choose."""
     law = PowerLaw(index=0.05, regularization=1e-3)
     scene = StirringTool(nodes=Auto(resolution=2.0, growth=0.3, spacing=0.5))
     absent, strong = (
@@ -184,3 +184,9 @@ def test_small_indices_are_solved_by_the_default_form_and_not_by_the_strong_one(
     assert absent["torque_error"] < 0.01
     assert strong["form"] == "strong"
     assert strong["status"] != "converged"
+    assert strong["message"].endswith('at an index of 0.05: leave discretizer.form out, or set it to "conservative"')
+
+
+def test_there_is_no_advice_where_the_form_is_not_the_cause() -> None:
+    for form, index in (("strong", 0.3), ("conservative", 0.05), (None, 0.05)):
+        assert not RadialBasis(form=form).advice(PowerLaw(index=index), 100.0)
