@@ -28,7 +28,6 @@ from nlsolve.flow.state import FlowParts, FlowState
 from nlsolve.flow.validity import audit
 from nlsolve.series import Array
 
-
 UNSOLVED = (Status.BUDGET_SPENT, Status.STAGNATED, Status.DIVERGED)
 """Of iterations that have not arrived."""
 
@@ -74,7 +73,10 @@ class FlowSimulation(Simulation):
         if outcome.status not in UNSOLVED:
             return outcome
         advice = self.parts.discretizer.advice(self.parts.law, self.parts.scene.reference_rate)
-        return replace(outcome, detail="; ".join(filter(None, (outcome.detail, advice))))
+        if not advice:
+            return outcome
+        said = outcome.detail == outcome.status.sentence
+        return replace(outcome, detail=advice if said else f"{outcome.detail}; {advice}")
 
     def keep(self, solve: Solve, state: Array) -> Mapping[str, float]:
         """Keep a solved state (2F,); returns the drift of accumulated strain rates, and place and velocity of the
