@@ -57,7 +57,7 @@ GRADINGS = {
 """
 REFINEMENTS = {
     "finite elements": (2.0, 1.0, 0.5, 0.3),
-    "triangles": (2.0, 1.0, 0.5, 0.3),
+    "triangles": (2.8, 2.0, 1.0, 0.5, 0.3),
     "delaunay": (2.0, 1.2, 0.6, 0.35, 0.2),
     "mls": (1.4, 0.8, 0.4, 0.25),
 }
