@@ -9,6 +9,7 @@ from nlsolve.contracts.continuum.cloud import Cloud, Exact, hat_gradients
 from nlsolve.contracts.continuum.discretizer import Discretizer, Operators, PointOperators
 from nlsolve.contracts.continuum.law import ConstitutiveLaw, PowerForm, local_index, stress, tangent_moduli
 from nlsolve.contracts.continuum.terms import NodeMotion, Physics, Recording, TimeSteps
+from nlsolve.contracts.continuum.triangulation import doubled_areas, on_one_wall, side_keys
 from nlsolve.contracts.continuum.walls import middles as wall_middles
 from nlsolve.contracts.continuum.walls import wall_edges
 from nlsolve.contracts.linear_solver import Factors, LinearSolver
@@ -87,11 +88,14 @@ __all__ = [
     "Workload",
     "as_column",
     "cached_jacobian",
+    "doubled_areas",
     "hat_gradients",
     "hookimpl",
     "least_squares",
     "local_index",
     "norm",
+    "on_one_wall",
+    "side_keys",
     "stress",
     "tangent_moduli",
     "unit",

@@ -26,6 +26,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 Array = NDArray[np.float64]
+Indices = NDArray[np.intp]
 Mask = NDArray[np.bool_]
 INFINITE, UNREAL, STEEP = "it is infinite there", "it has no real value there", "its slope is infinite there"
 FIRST_CAPACITY = 24  # coefficients packed arrays have room for at first; doubled whenever they are full

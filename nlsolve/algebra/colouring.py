@@ -7,8 +7,7 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 
-from nlsolve.contracts.continuum.cloud import Indices
-from nlsolve.series import Array
+from nlsolve.series import Array, Indices
 
 
 class Colouring:

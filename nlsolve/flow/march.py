@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -16,10 +16,10 @@ from nlsolve.contracts.scene import Entry, Simulation, Solve, Workload
 from nlsolve.contracts.status import SolveError, Status
 from nlsolve.flow.accuracy.adaptation import Adaptation
 from nlsolve.flow.accuracy.enrichment import carried
-from nlsolve.flow.accuracy.estimate import NOTHING_TO_COMPARE, UNKNOWN, Comparison, compared
+from nlsolve.flow.accuracy.estimate import NOTHING_TO_COMPARE, Comparison, compared
 from nlsolve.flow.claims.units import SMALL, WAY_OUT
-from nlsolve.flow.continuation import REST, Solves, Stage, walk
-from nlsolve.flow.first_state.descent import arrival, descent, may_descend
+from nlsolve.flow.continuation import REST, Solves, Stage
+from nlsolve.flow.first_state.first_state import FirstState
 from nlsolve.flow.incompressibility import iterate_pressure
 from nlsolve.flow.momentum import Flow
 from nlsolve.flow.motion.markers import Markers
@@ -54,6 +54,9 @@ class FlowSimulation(Simulation):
         self.probe: int | None = None
         self.rest: Array | None = None  # velocity at t = 0 of a march that begins at rest
         self.adaptation = None if parts.scene.adaptive is None else Adaptation(parts.scene.adaptive)
+        self.way = FirstState(
+            self.state, self.adaptation, not self.increments, lambda flow: self.increment(0, flow), self.settle
+        )
 
     def solves(self) -> Solves:
         """Yields the problems of the first state and of each increment, until one fails. May raise SolveError."""
@@ -135,27 +138,9 @@ class FlowSimulation(Simulation):
         return cloud
 
     def first_state(self) -> Solves:
-        """Solve the quasi-static problem at t = 0 by continuation; the method of the case solves a steady target."""
+        """Solve the quasi-static problem at t = 0; the method of the case solves a steady one."""
         parts, state = self.parts, self.state
-
-        def solve_stage(stage: Stage, last: bool) -> Solves:
-            if not last:
-                return self.prepare(stage)
-            if self.increments or self.adaptation is not None:
-                return iterate_pressure(state, lambda: self.prepare(stage))
-            return iterate_pressure(state, lambda: self.increment(0, state.flow_of(stage.law)))
-
-        outcome, stage = yield from self.approach(solve_stage)
-        while self.adaptation is not None and outcome.status is Status.CONVERGED and self.adapt(self.adaptation):
-            outcome = yield from solve_stage(stage, True)
-            if outcome.status is not Status.CONVERGED:  # the state of the last cloud is no start for this one
-                state.to_rest()
-                outcome, stage = yield from self.approach(solve_stage)
-        if self.adaptation is not None and outcome.status is Status.CONVERGED:
-            outcome = yield from iterate_pressure(state, lambda: self.increment(0, state.flow_of(parts.law)))
-            if outcome.status is Status.CONVERGED and not self.adaptation.reached:
-                detail = self.adaptation.shortfall(len(state.cloud.nodes))
-                outcome = replace(outcome, status=Status.INACCURATE, detail=detail)
+        outcome, stage = yield from self.way.solves()
         if outcome.status is Status.CONVERGED:
             assert state.flow is not None
             self.record_beginning(state.flow)
@@ -163,51 +148,6 @@ class FlowSimulation(Simulation):
             detail = f"on the way to the first state, at {parts.start.by} = {stage.value:g}: {outcome.detail}"
             return replace(outcome, detail=detail)
         return outcome
-
-    def approach(
-        self, solve_stage: Callable[[Stage, bool], Solves]
-    ) -> Generator[Solve, Outcome, tuple[Outcome, Stage]]:
-        """From rest to the first state: by descent where any way serves that the case's own method takes no part in,
-        else, and where that fails, stage after stage.
-        """
-        parts, state = self.parts, self.state
-        stages = parts.start.stages(parts.law)
-        if self.descends(stages):
-            outcome = yield from descent(state)
-            if outcome.status is Status.CONVERGED:
-                return outcome, stages[-1]
-            state.to_rest()
-        return (yield from walk(parts.start, parts.law, solve_stage))
-
-    def descends(self, stages: list[Stage]) -> bool:
-        """Whether the first state is reached without the stages of a continuation."""
-        return (self.increments > 0 or self.adaptation is not None) and may_descend(self.parts, stages)
-
-    def adapt(self, adaptation: Adaptation) -> bool:
-        """Estimate the error of the state, and carry it to a cloud for the error asked for; False where that is reached
-        already, or the limits allow no larger cloud. May raise SolveError.
-        """
-        state = self.state
-        refused: SolveError | None = None
-        with state.entry("estimate"):
-            try:
-                found = compared(state, state.velocity, None)
-            except SolveError as refusal:  # a better cloud may be one on which the flow can be solved
-                refused, found = refusal, UNKNOWN
-        adaptation.judge(found)
-        count = None if adaptation.reached else adaptation.next_count(len(state.cloud.nodes), state.discretizer.order)
-        if count is None:
-            if refused is not None:
-                raise refused
-            return False
-        here = state.cloud
-        with state.entry("operators"):
-            cloud = adaptation.cloud(self.parts.scene, state.discretizer, here, state.velocity, count)
-            carry = carried(here, cloud)
-        adaptation.rounds += 1
-        state.carry_to(cloud, carry)
-        self.settle(cloud)
-        return True
 
     def first_increment_from_rest(self) -> Solves:
         """V(t = 0) = 0 inside, and what is prescribed on the boundary; the method of the case solves increment 1.
@@ -232,20 +172,6 @@ class FlowSimulation(Simulation):
                 parts.scene, parts.time.increment, parts.discretizer, self.initial, self.state.velocity
             )
         self.record_fields_if_due(flow)
-
-    def prepare(self, stage: Stage) -> Solves:
-        """Yields the problem of one stage on the way to the first state. On a cloud made from a solution it may take
-        all iterations of the budget, for to go all the way again costs more, and where the way is left open it is
-        solved as at the end of a descent.
-        """
-        most = self.parts.budget.iterations
-        if self.adaptation is not None and self.adaptation.rounds and self.parts.start.is_free:
-            return (yield from arrival(self.state, most))
-        flow = self.state.flow_of(stage.law, load=stage.load)
-        preparation = self.parts.start.preparation(most)
-        if self.adaptation is not None and self.adaptation.rounds:
-            preparation = replace(preparation, iterations=most)
-        return (yield Solve(flow, flow.unknowns(self.state.guess), preparation=preparation))
 
     def advance(self, k: int) -> Solves:
         """Solve increment k: move the nodes if they move, then yield the problem at its end. May raise SolveError."""
@@ -351,8 +277,7 @@ class FlowSimulation(Simulation):
         """Increments, clouds that are discretised, and stages of the continuation; a descent costs as much as one."""
         increments = max(1, self.increments)
         clouds = 1 + (increments if self.parts.motion.moving else 0)
-        stages = self.parts.start.stages(self.parts.law)
-        return Workload(increments, clouds, 1 if self.descends(stages) else len(stages))
+        return Workload(increments, clouds, self.way.count)
 
     def diagnostics(self) -> list[dict[str, Any]]:
         """One row for each operator of the cloud at t = 0 on its quality, or one with the reason why there is none."""

@@ -16,14 +16,14 @@ import numpy as np
 import scipy
 import scipy.sparse as sp
 
-from nlsolve.contracts.continuum.cloud import Cloud, Indices, node_major
+from nlsolve.contracts.continuum.cloud import Cloud, node_major
 from nlsolve.contracts.continuum.discretizer import Discretizer, Operators, PointOperators
 from nlsolve.contracts.continuum.law import ConstitutiveLaw, Number, rate_squared, stress, tangent_moduli
 from nlsolve.contracts.problem import Expansion, NonlinearProblem
 from nlsolve.contracts.status import SolveError, Status
 from nlsolve.flow.convection import Carried, Convection
 from nlsolve.flow.motion.point_rates import PointRates
-from nlsolve.series import Array, NoSeriesHere, Series
+from nlsolve.series import Array, Indices, NoSeriesHere, Series
 
 WAY_OUT = "give it a regularization ε₀ > 0, or begin from a state that is deformed everywhere (start.values)"
 

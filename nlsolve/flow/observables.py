@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 import pandas as pd
-import scipy
 
-from nlsolve.contracts.continuum.cloud import Cloud, Indices, hat_gradients
+from nlsolve.contracts.continuum.cloud import Cloud, hat_gradients
 from nlsolve.contracts.continuum.discretizer import Discretizer
 from nlsolve.contracts.continuum.geometry import Geometry
 from nlsolve.contracts.continuum.law import rate_squared, stress
 from nlsolve.contracts.continuum.terms import NodeMotion
 from nlsolve.flow.momentum import Flow
-from nlsolve.series import Array
+from nlsolve.series import Array, Indices
 
 NEGLIGIBLE = 1e-6
 """Change of a share of the wall's velocity over a triangle that adds nothing to be seen to the wall's reaction."""
@@ -140,7 +139,7 @@ def _on_triangles(
     stress in their centres, less `pressure` at the volume points (L,) when it is given.
     """
     nodes = flow.cloud.nodes
-    corners = scipy.spatial.Delaunay(nodes).simplices
+    corners = flow.cloud.triangulation
     corners = corners[np.ptp(carried[corners], axis=1) > NEGLIGIBLE]
     centres = nodes[corners].mean(axis=1)
     xx, yy, xy = flow.stress_at_points(u) @ discretizer.values(flow.operators.strain.points, centres).T

@@ -7,11 +7,11 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 
-from nlsolve.contracts.continuum.cloud import Cloud, Indices, node_major
+from nlsolve.contracts.continuum.cloud import Cloud, node_major
 from nlsolve.contracts.continuum.discretizer import Discretizer, Operators
 from nlsolve.contracts.status import SolveError
 from nlsolve.flow.claims.shapes import check_operators
-from nlsolve.series import Array
+from nlsolve.series import Array, Indices
 from nlsolve.testing.kit.verdicts import promise
 from nlsolve.testing.promises import require, same, shaped
 

@@ -9,6 +9,7 @@ import scipy.sparse as sp
 
 ASYMMETRY = 1e-12  # largest |A − Aᵀ| over largest |A| of a matrix that counts as symmetric
 MOST, NEAR = 12, 3  # steps towards equilibrium, and the power of two within which entries are near 1
+GOLDEN = 0.5 * (1.0 + 5.0**0.5)
 TINY = float(np.finfo(float).tiny)
 
 
@@ -52,12 +53,12 @@ def largest_in_rows(matrix: Any) -> np.ndarray:
 
 
 def is_symmetric(compressed: Any) -> bool:
-    """Whether a sparse matrix, compressed and sorted, is its transpose, to 1e-12 of its largest entry.
+    """Whether a sparse matrix is its transpose, to 1e-12 of its largest entry: |A w − Aᵀ w| for one vector w of weights
+    between 1 and 2, of which no sum cancels by chance.
 
     Entries that cancel are stored on one side and not on the other, so the patterns need not be the same.
     """
+    weights = 1.0 + np.modf(GOLDEN * np.arange(compressed.shape[0]))[0]
+    difference = compressed @ weights - weights @ compressed
     largest = np.abs(compressed.data).max(initial=0.0)
-    turned = compressed.T.asformat(compressed.format)
-    alike = all(np.array_equal(getattr(turned, name), getattr(compressed, name)) for name in ("indptr", "indices"))
-    difference = turned.data - compressed.data if alike else (compressed - turned).data
     return bool(np.abs(difference).max(initial=0.0) <= ASYMMETRY * largest)

@@ -9,8 +9,6 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 
-from nlsolve_linear.equilibrium import ASYMMETRY, is_symmetric
-
 
 def laid_out(compressed: Any, before: Layout | None) -> tuple[Layout, Any]:
     """The layout of a matrix in compressed rows, that of `before` if it fits, and the matrix with its entries sorted
@@ -68,33 +66,15 @@ class Layout:
         return sp.csr_array((values, self.columns, self.starts), shape=matrix.shape)
 
     @cached_property
-    def mirror(self) -> np.ndarray | None:
-        """For each sorted entry the number of the one on the other side of the diagonal, (E,); None where some have
-        none.
-        """
-        size = len(self.starts) - 1
-        numbered = sp.csr_array((np.arange(len(self.columns)), self.columns, self.starts), shape=(size, size))
-        turned = numbered.T.tocsr()
-        alike = np.array_equal(turned.indptr, self.starts) and np.array_equal(turned.indices, self.columns)
-        return turned.data if alike else None
-
-    def is_symmetric(self, matrix: Any) -> bool:
-        """Whether a sorted matrix of this pattern is symmetric, as `equilibrium.is_symmetric` has it."""
-        if self.mirror is None:
-            return is_symmetric(matrix)
-        largest = np.abs(matrix.data).max(initial=0.0)
-        return bool(np.abs(matrix.data - matrix.data[self.mirror]).max(initial=0.0) <= ASYMMETRY * largest)
-
-    @cached_property
-    def upper(self) -> Any:
-        """The numbers of the sorted entries on and above the diagonal, as the values of a matrix."""
-        size = len(self.starts) - 1
-        numbers = np.arange(1, len(self.columns) + 1)  # no zero, which is not stored
-        above = sp.triu(sp.csr_array((numbers, self.columns, self.starts), shape=(size, size)), format="csr")
-        above.data -= 1
-        return above
+    def upper(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Of the entries on and above the diagonal: numbers among the sorted ones, columns, and starts of rows."""
+        rows = np.repeat(np.arange(len(self.starts) - 1, dtype=self.columns.dtype), np.diff(self.starts))
+        above = self.columns >= rows
+        numbers = np.flatnonzero(above)
+        starts = np.concatenate([[0], np.cumsum(above)])[self.starts].astype(self.starts.dtype)
+        return numbers, self.columns[numbers], starts
 
     def upper_of(self, matrix: Any) -> Any:
         """The entries on and above the diagonal of a sorted matrix of this pattern."""
-        upper = self.upper
-        return sp.csr_array((matrix.data[upper.data], upper.indices, upper.indptr), shape=matrix.shape)
+        numbers, columns, starts = self.upper
+        return sp.csr_array((matrix.data[numbers], columns, starts), shape=matrix.shape)

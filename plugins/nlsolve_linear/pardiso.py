@@ -1,4 +1,5 @@
-"""Supernodal LU, and LDLᵀ for symmetric tangents, by oneMKL PARDISO (Schenk & Gärtner 2004): extra nlsolve[pardiso].
+"""Supernodal LU, and LLᵀ or LDLᵀ for symmetric tangents, by oneMKL PARDISO (Schenk & Gärtner 2004): extra
+nlsolve[pardiso].
 
 The analysis of a pattern is taken from the previous factors as long as the pattern is the same. PARDISO then overwrites
 those, and it perturbs pivots that vanish without a word: `PardisoFactors` restores what was overwritten, and holds
@@ -14,7 +15,7 @@ import scipy.sparse as sp
 from pydantic import Field
 
 from nlsolve.plugin import Factors, LinearSolver, SolveError, Status
-from nlsolve_linear.equilibrium import equilibrated
+from nlsolve_linear.equilibrium import equilibrated, is_symmetric
 from nlsolve_linear.layout import Layout, laid_out
 
 try:
@@ -24,12 +25,15 @@ except ImportError:  # an extra: nlsolve[pardiso]
 
 ABSENT = "needs the library py-mkl-pardiso, for x86-64 only: pip install 'nlsolve[pardiso]'"
 
+LU, LDLT, LLT = "lu", "ldlt", "llt"
+
 # PARDISO's parameters, counted from zero. Dissection by METIS; pivots below 10⁻¹³ of the norm are perturbed; scaling
-# and matching for LU, pivots of Bunch & Kaufman (1977) for LDLᵀ; the entries of the factors are counted. No
-# refinement: the ledger refines.
+# and matching for LU, pivots of Bunch & Kaufman (1977) for LDLᵀ, none for LLᵀ; the entries of the factors are counted.
+# No refinement: the ledger refines.
 PARAMETERS: dict[str, dict[int, int]] = {
-    "lu": {1: 2, 9: 13, 10: 1, 12: 1, 17: -1},
-    "ldlt": {1: 2, 9: 13, 17: -1, 20: 1},
+    LU: {1: 2, 9: 13, 10: 1, 12: 1, 17: -1},
+    LDLT: {1: 2, 9: 13, 17: -1, 20: 1},
+    LLT: {1: 2, 17: -1},
 }
 PERTURBED, ENTRIES = 13, 17
 """Where PARDISO tells how many pivots it has perturbed, and how many entries the factors hold."""
@@ -38,7 +42,9 @@ ACCURATE = 1e-9
 """Largest ‖b − A x‖ over the size of its terms of factors that solve what they were made for."""
 
 REACHED = 1e-6
-"""The same over ‖b‖ where a pivot was perturbed: a singular matrix does not reach every b."""
+"""The same over ‖b‖ where a pivot was perturbed or, in LLᵀ, may be mere rounding: a singular matrix does not reach every
+b.
+"""
 
 SINGULAR = 1.0 / float(np.finfo(float).eps)
 """‖A‖ ‖x‖ over ‖b‖ above which A is singular to working precision."""
@@ -48,7 +54,7 @@ class _Analysed:
     """One pattern with its analysis in the library, and the factors that this holds now."""
 
     def __init__(self, kind: str, layout: Layout, matrix: Any) -> None:
-        types = {"lu": mkl.MTYPE_REAL_NONSYM, "ldlt": mkl.MTYPE_REAL_SYM_INDEF}
+        types = {LU: mkl.MTYPE_REAL_NONSYM, LDLT: mkl.MTYPE_REAL_SYM_INDEF, LLT: mkl.MTYPE_REAL_SYM_POSDEF}
         # Its constructor looks at a symmetric matrix row by row, which takes longer than the analysis: it gets one row.
         # The pattern is set in what it wraps; tests hold every release against this.
         one = sp.csr_array(np.ones((1, 1)))
@@ -62,43 +68,61 @@ class _Analysed:
 
     def hold(self, values: np.ndarray, anew: bool = False) -> None:
         """Make the library hold the factors of these values, with a new analysis if wanted."""
+        if values is self._held and not anew:
+            return
+        self._held = None  # what fails leaves nothing to be held
         if anew:
             self.solver.factor(values)
-        elif values is not self._held:
+        else:
             self.solver.refactor(values)
         self._held = values
 
 
 class PardisoFactors(Factors):
-    """L and U, or L and D, of one matrix."""
+    """L and U, L and D, or L alone of one matrix."""
 
     def __init__(self, compressed: Any, detect: bool, previous: Factors | None) -> None:
         earlier = previous._library if isinstance(previous, PardisoFactors) else None
         layout, rows = laid_out(compressed, None if earlier is None else earlier.layout)
-        symmetric = detect and layout.is_symmetric(rows)
+        symmetric = detect and is_symmetric(rows)
         self._rows, self._columns, matrix = equilibrated(rows, symmetric)
-        kind = "ldlt" if symmetric else "lu"
         stored = layout.upper_of(matrix) if symmetric else matrix
         self._values = stored.data
         self._library: _Analysed
-        norm = float(abs(matrix).sum(axis=1).max())
-        try:
-            if earlier is not None and earlier.kind == kind and earlier.layout is layout:
-                self._library = earlier
-                self._library.hold(self._values)
-                left = self._left(matrix, norm)
-                if left > ACCURATE:  # the analysis has the scaling and the matching of other values
-                    self._library.hold(self._values, anew=True)
-                    left = self._left(matrix, norm)
+        if earlier is not None and earlier.layout is not layout:
+            earlier = None
+        kinds = _kinds(matrix, earlier) if symmetric else [LU]
+        for tried, kind in enumerate(kinds, start=1):
+            self.attempts = tried
+            try:
+                left = self._made(kind, layout, stored, matrix, earlier)
+            except RuntimeError as failure:
+                why = str(failure)
             else:
-                self._library = _Analysed(kind, layout, stored)
-                left = self._left(matrix, norm)
-        except RuntimeError as failure:
-            raise SolveError(Status.SINGULAR_TANGENT, f"PARDISO: {failure}") from failure
-        if not left <= ACCURATE:
-            raise SolveError(Status.SINGULAR_TANGENT, "PARDISO: its factors do not solve with the matrix")
+                if left <= ACCURATE:
+                    break
+                why = "its factors do not solve with the matrix"
+        else:
+            raise SolveError(Status.SINGULAR_TANGENT, f"PARDISO: {why}")
         self.ordering = f"metis, {kind}"
         self.fill = int(self._library.solver.get_iparm_value(ENTRIES))
+
+    def _made(self, kind: str, layout: Layout, stored: Any, matrix: Any, earlier: _Analysed | None) -> float:
+        """Make the factors, with the analysis of earlier ones of the same kind; what they leave of a b, see `_left`.
+
+        Raises RuntimeError, the library's.
+        """
+        norm = float(abs(matrix).sum(axis=1).max())
+        if earlier is None or earlier.kind != kind:
+            self._library = _Analysed(kind, layout, stored)
+            return self._left(matrix, norm)
+        self._library = earlier
+        self._library.hold(self._values)
+        left = self._left(matrix, norm)
+        if left > ACCURATE:  # the analysis has the scaling and the matching of other values
+            self._library.hold(self._values, anew=True)
+            left = self._left(matrix, norm)
+        return left
 
     def _left(self, matrix: Any, norm: float) -> float:
         """‖b − A x‖ over ‖A‖ ‖x‖ + ‖b‖, maximum norms, for one b; infinite where A counts as singular.
@@ -108,7 +132,8 @@ class PardisoFactors(Factors):
         b = np.cos(np.arange(len(self._rows)))
         x = self._library.solver.solve(b)
         left, terms = np.abs(b - matrix @ x).max(), norm * np.abs(x).max()
-        unreached = self._library.solver.get_iparm_value(PERTURBED) > 0 and not left <= REACHED
+        doubtful = self._library.kind == LLT or self._library.solver.get_iparm_value(PERTURBED) > 0
+        unreached = doubtful and not left <= REACHED
         return np.inf if unreached or not terms < SINGULAR else float(left / (terms + 1.0))
 
     def solve(self, rhs: np.ndarray) -> np.ndarray:
@@ -117,15 +142,25 @@ class PardisoFactors(Factors):
         return self._columns * self._library.solver.solve(self._rows * rhs)
 
 
+def _kinds(matrix: Any, earlier: _Analysed | None) -> list[str]:
+    """The factors to be tried of a symmetric matrix: LLᵀ, which exist where it is positive definite, are the cheapest;
+    an earlier matrix of the same pattern that had none is followed by others as a rule.
+    """
+    indefinite = (earlier is not None and earlier.kind == LDLT) or matrix.diagonal().min(initial=np.inf) <= 0.0
+    return [LDLT] if indefinite else [LLT, LDLT]
+
+
 class Pardiso(LinearSolver):
-    """LU with scaling, matching and pivots within supernodes, and LDLᵀ for a symmetric matrix, at half the entries.
+    """LU with scaling, matching and pivots within supernodes; for a symmetric matrix LLᵀ, or LDLᵀ where it is not
+    positive definite, at half the entries.
 
     Its factors give no condition: PARDISO must analyse anew before it solves with the transposed matrix.
     """
 
     kind: Literal["pardiso"] = "pardiso"
     symmetric: Literal["detect", "never"] = Field(
-        "detect", description="LDLᵀ for a matrix found symmetric to 1e-12, the tangent of a conservative form; or never"
+        "detect",
+        description="LLᵀ or LDLᵀ for a matrix found symmetric to 1e-12, the tangent of a conservative form; or never",
     )
     absent: ClassVar[str | None] = ABSENT if mkl is None else None
 

@@ -11,10 +11,9 @@ import scipy
 from numpy.typing import NDArray
 
 from nlsolve.contracts.continuum.near import Near
+from nlsolve.contracts.continuum.triangulation import found, kept
 from nlsolve.contracts.status import SolveError, Status
-from nlsolve.series import Array
-
-Indices = NDArray[np.intp]
+from nlsolve.series import Array, Indices
 
 
 @dataclass(frozen=True)
@@ -28,6 +27,9 @@ class Cloud:
     boundaries: Mapping[str, Indices]
     near_before: Near | None = field(default=None, repr=False, compare=False, kw_only=True)
     """What was near each of the same nodes before they moved here."""
+
+    triangles_before: Indices | None = field(default=None, repr=False, compare=False, kw_only=True)
+    """Triangles (T, 3) of these nodes, from which a few flips of edges lead to Delaunay's."""
 
     def __post_init__(self) -> None:
         if not len(self.nodes):
@@ -44,8 +46,8 @@ class Cloud:
 
     @cached_property
     def nearest_distance(self) -> Array:
-        """Distance of every node to its nearest neighbour, shape (N,) [mm]."""
-        return self.near.distance
+        """Distance of every node to its nearest neighbour, shape (N,) [mm]; infinite for a single one."""
+        return self.near.distance if self.near_before else self.tree.query(self.nodes, [2])[0][:, 0]
 
     @cached_property
     def near(self) -> Near:
@@ -61,12 +63,30 @@ class Cloud:
         return scipy.spatial.cKDTree(self.nodes)
 
     @cached_property
+    def triangulation(self) -> Indices:
+        """Delaunay's triangulation of all nodes, shape (T, 3), counter-clockwise: holes and hollows of the flow have
+        triangles too. Raises SolveError (bad cloud) if the nodes lie on one line.
+        """
+        before = self.triangles_before
+        return found(self.nodes) if before is None else self.triangulated_from(before)
+
+    def triangulated_from(self, corners: Indices) -> Indices:
+        """Delaunay's triangulation (T, 3) by flips in another one; where these do not lead there it is found anew."""
+        whole = kept(corners, self.nodes, self.walls)
+        return found(self.nodes) if whole is None else whole
+
+    @cached_property
+    def walls(self) -> Indices:
+        """The number of the boundary group of each node, from 1 on, 0 inside, shape (N,)."""
+        numbers = np.zeros(len(self.nodes), dtype=np.intp)
+        for number, group in enumerate(self.boundaries.values(), start=1):
+            numbers[group] = number
+        return numbers
+
+    @cached_property
     def on_boundary(self) -> NDArray[np.bool_]:
         """True for nodes of any boundary group, shape (N,)."""
-        mask = np.zeros(len(self.nodes), dtype=bool)
-        for group in self.boundaries.values():
-            mask[group] = True
-        return mask
+        return self.walls > 0
 
     @cached_property
     def interior(self) -> Indices:
@@ -80,7 +100,7 @@ class Cloud:
 
     def moved_to(self, nodes: Array) -> Cloud:
         """A cloud with the same groups and other places `nodes` (N, 2) [mm]. Raises SolveError (bad cloud)."""
-        return replace(self, nodes=nodes, near_before=self.near)
+        return replace(self, nodes=nodes, near_before=self.near, triangles_before=None)
 
 
 @dataclass(frozen=True)

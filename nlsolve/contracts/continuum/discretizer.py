@@ -26,9 +26,9 @@ import scipy
 import scipy.sparse as sp
 
 from nlsolve.contracts.component import Component
-from nlsolve.contracts.continuum.cloud import Cloud, Indices, node_major
+from nlsolve.contracts.continuum.cloud import Cloud, node_major
 from nlsolve.contracts.continuum.law import CONTRACTION, ConstitutiveLaw
-from nlsolve.series import Array
+from nlsolve.series import Array, Indices
 
 
 @dataclass(frozen=True)

@@ -7,11 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
-from nlsolve.series import Array
-
-Numbers = NDArray[np.intp]
+from nlsolve.series import Array, Indices
 
 LISTED = 8
 """Nodes that are listed around each one."""
@@ -28,7 +25,7 @@ class Near:
     """
 
     nodes: Array
-    listed: Numbers
+    listed: Indices
     reach: Array
     distance: Array
 
@@ -55,7 +52,7 @@ class Near:
             return Near(nodes, self.listed, reach, distance)
         return Near(nodes, self.listed.copy(), reach, distance)._filled(short, tree())
 
-    def _filled(self, which: Numbers, tree: scipy.spatial.cKDTree) -> Near:
+    def _filled(self, which: Indices, tree: scipy.spatial.cKDTree) -> Near:
         """These, still in nobody's hands, with what the tree finds for the nodes `which`."""
         count = self.listed.shape[1]
         distance, index = tree.query(

@@ -10,8 +10,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from nlsolve.contracts.continuum.cloud import Cloud, Indices
-from nlsolve.series import Array
+from nlsolve.contracts.continuum.cloud import Cloud
+from nlsolve.series import Array, Indices
 
 CORNER = float(np.cos(np.pi / 4.0))
 """Cosine of the turning between two edges of a wall from which there is a corner between them."""

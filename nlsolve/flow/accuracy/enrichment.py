@@ -4,16 +4,17 @@ those that a discretizer adds.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
 import scipy
 
-from nlsolve.contracts.continuum.cloud import Cloud, Indices
+from nlsolve.contracts.continuum.cloud import Cloud
+from nlsolve.contracts.continuum.triangulation import edges_of, subdivided
 from nlsolve.contracts.continuum.walls import middles, wall_edges
-from nlsolve.series import Array
+from nlsolve.series import Array, Indices
 
 
 class Finer(Protocol):
@@ -56,44 +57,44 @@ class Enriched:
 
 def inner_edges(cloud: Cloud) -> Indices:
     """The edges of the Delaunay triangulation with a node inside, (E, 2). Across a hole both ends are at its wall."""
-    return _inner_edges(cloud, scipy.spatial.Delaunay(cloud.nodes).simplices)
-
-
-def _inner_edges(cloud: Cloud, corners: Indices) -> Indices:
-    edges = edges_of(corners)
+    edges = edges_of(cloud.triangulation)
     return edges[~cloud.on_boundary[edges].all(axis=1)]
 
 
-def edges_of(corners: Indices) -> Indices:
-    """The edges (E, 2) of triangles with these corners (T, 3), each once."""
-    sides = np.concatenate([corners[:, [0, 1]], corners[:, [1, 2]], corners[:, [2, 0]]])
-    return np.unique(np.sort(sides, axis=1), axis=0)
-
-
 def enriched(cloud: Cloud, edges: Indices) -> Enriched:
-    """The cloud with a node in the middle of each of these edges (E, 2)."""
-    return Enriched(Cloud(np.concatenate([cloud.nodes, cloud.nodes[edges].mean(axis=1)]), cloud.boundaries), edges)
+    """The cloud with a node in the middle of each of these edges (E, 2); the cloud itself without any."""
+    return (
+        _with_nodes(cloud, edges, cloud.nodes[edges].mean(axis=1), cloud.boundaries)
+        if len(edges)
+        else Enriched(cloud, edges)
+    )
 
 
 def twice_as_fine(cloud: Cloud) -> Enriched:
     """The cloud with a node in the middle of each edge inside and at walls: about four times as many."""
-    corners = scipy.spatial.Delaunay(cloud.nodes).simplices
-    within, walls = enriched(cloud, _inner_edges(cloud, corners)), wall_edges(cloud, corners)
+    within, walls = inner_edges(cloud), wall_edges(cloud, cloud.triangulation)
     both_in = [np.isin(walls[:, 1:3], group).all(axis=1) for group in cloud.boundaries.values()]
     named = np.array(both_in).reshape(len(both_in), len(walls)).any(axis=0)
-    numbers = len(within.cloud.nodes) - 1 + np.cumsum(named)
+    numbers = len(cloud.nodes) + len(within) - 1 + np.cumsum(named)
     groups = {
         name: np.concatenate([group, numbers[both & named]])
         for (name, group), both in zip(cloud.boundaries.items(), both_in, strict=True)
     }
-    nodes = np.concatenate([within.cloud.nodes, middles(cloud.nodes, walls[named])])
-    return Enriched(Cloud(nodes, groups), np.concatenate([within.ends, walls[named, 1:3]]))
+    places = np.concatenate([cloud.nodes[within].mean(axis=1), middles(cloud.nodes, walls[named])])
+    return _with_nodes(cloud, np.concatenate([within, walls[named, 1:3]]), places, groups)
+
+
+def _with_nodes(cloud: Cloud, edges: Indices, places: Array, boundaries: Mapping[str, Indices]) -> Enriched:
+    """The cloud with a node at each of `places` (E, 2) near the middle of `edges` (E, 2)."""
+    triangles = subdivided(cloud.triangulation, edges, len(cloud.nodes))
+    nodes = np.concatenate([cloud.nodes, places])
+    return Enriched(Cloud(nodes, boundaries, triangles_before=triangles), edges)
 
 
 def carried(here: Cloud, there: Cloud) -> Callable[[Array], Array]:
     """Values (N, 2) at the nodes `here` -> at the nodes `there`: linear between nodes, the nearest beyond them."""
     triangles = scipy.spatial.Delaunay(here.nodes)
-    nearest = scipy.spatial.cKDTree(here.nodes).query(there.nodes)[1]
+    nearest = here.tree.query(there.nodes)[1]
 
     def values(at_nodes: Array) -> Array:
         between = scipy.interpolate.LinearNDInterpolator(triangles, at_nodes)(there.nodes)

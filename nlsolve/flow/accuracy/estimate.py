@@ -23,7 +23,6 @@ from typing import Any
 
 import numpy as np
 
-from nlsolve.contracts.continuum.cloud import Cloud
 from nlsolve.contracts.continuum.discretizer import Discretizer
 from nlsolve.contracts.linear_solver import Factors, LinearSolver
 from nlsolve.contracts.status import SolveError, Status
@@ -86,7 +85,7 @@ def compared(state: FlowState, velocity: Array, before: Array | None) -> Compari
     def solution(finer: Finer) -> Array:
         return _solution(state, finer, estimator, velocity, before, work)[: len(velocity)]
 
-    here = Cloud(state.cloud.nodes, state.cloud.boundaries)
+    here = state.cloud
     completed = estimator.completed(here)
     if len(completed.nodes) > len(here.nodes):
         best = solution(Completed(completed, here))

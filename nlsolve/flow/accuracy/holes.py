@@ -7,12 +7,11 @@ r / s : r is the circumradius of a Delaunay triangle whose centre lies in the fl
 from __future__ import annotations
 
 import numpy as np
-import scipy
 
-from nlsolve.contracts.continuum.cloud import Cloud, Indices
-from nlsolve.flow.accuracy.enrichment import edges_of
+from nlsolve.contracts.continuum.cloud import Cloud
+from nlsolve.contracts.continuum.triangulation import edges_of
 from nlsolve.flow.claims.finding import NOTHING, Finding
-from nlsolve.series import Array
+from nlsolve.series import Array, Indices
 
 
 def largest_hole(cloud: Cloud) -> Finding:
@@ -20,24 +19,39 @@ def largest_hole(cloud: Cloud) -> Finding:
 
     A triangle lies in the flow when a corner is an inner node; where all three are at walls it may lie outside.
     """
-    nodes = cloud.nodes
-    triangulation = scipy.spatial.Delaunay(nodes)
-    corners = triangulation.simplices
+    nodes, edges = cloud.nodes, edges_of(cloud.triangulation)
+    corners = cloud.triangulation[~cloud.on_boundary[cloud.triangulation].all(axis=1)]
     centres = circumcentres(nodes[corners])
-    at = triangulation.find_simplex(np.nan_to_num(centres, nan=np.inf))
-    in_flow = ~cloud.on_boundary[corners].all(axis=1)
-    inside = np.flatnonzero(in_flow & (at >= 0) & in_flow[at])
-    if not len(inside):
+    radii = np.linalg.norm(nodes[corners[:, 0]] - centres, axis=1)
+    ratios = radii / spacings(nodes, edges)[corners].max(axis=1)
+    largest = _first_within(centres, np.argsort(-ratios, kind="stable"), nodes[corners])
+    if largest is None:
         return NOTHING
-    radii = np.linalg.norm(nodes[corners[inside, 0]] - centres[inside], axis=1)
-    ratios = radii / spacings(nodes, edges_of(corners))[corners[inside]].max(axis=1)
-    largest = int(ratios.argmax())
-    x, y = centres[inside[largest]]
+    x, y = centres[largest]
     return Finding(
         float(ratios[largest]),
         f"there is no node within {radii[largest]:.3g} mm of ({x:.3g}, {y:.3g}), {ratios[largest]:.2g} times the "
         "spacing around: add nodes there",
     )
+
+
+def _first_within(points: Array, order: Indices, corners: Array) -> int | None:
+    """The first of `points` (P, 2), in this order, in any triangle with these corners (T, 3, 2); None without one."""
+    x, y = np.moveaxis(corners, 2, 0)
+    low, high = corners.min(axis=1), corners.max(axis=1)
+    for number in order:
+        point = points[number]
+        near = np.flatnonzero(((low <= point) & (point <= high)).all(axis=1))
+        ahead, behind = (
+            (x[near] - point[0], y[near] - point[1]),
+            (
+                np.roll(x[near], -1, axis=1) - point[0],
+                np.roll(y[near], -1, axis=1) - point[1],
+            ),
+        )
+        if (ahead[0] * behind[1] - ahead[1] * behind[0] >= 0.0).all(axis=1).any():
+            return int(number)
+    return None
 
 
 def circumcentres(corners: Array) -> Array:

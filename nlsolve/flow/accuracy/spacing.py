@@ -15,7 +15,8 @@ import numpy as np
 import scipy
 
 from nlsolve.contracts.continuum.cloud import Cloud
-from nlsolve.series import Array
+from nlsolve.contracts.continuum.triangulation import edges_of
+from nlsolve.series import Array, Indices
 
 POWER = 0.4
 """p/(2p + 2) for p = 4."""
@@ -98,16 +99,15 @@ class _Triangles:
     """
 
     areas: Array
-    corners: Array
+    corners: Indices
     sides: scipy.sparse.csr_array
 
     @classmethod
     def of(cls, cloud: Cloud) -> _Triangles:
-        corners = scipy.spatial.Delaunay(cloud.nodes).simplices
+        corners = cloud.triangulation
         corners = corners[~cloud.on_boundary[corners].all(axis=1)]
         (ax, ay), (bx, by) = ((cloud.nodes[corners[:, end]] - cloud.nodes[corners[:, 0]]).T for end in (1, 2))
-        ends = np.concatenate([corners[:, [0, 1]], corners[:, [1, 2]], corners[:, [2, 0]]])
-        i, j = np.unique(np.sort(ends, axis=1), axis=0).T
+        i, j = edges_of(corners).T
         length = np.linalg.norm(cloud.nodes[i] - cloud.nodes[j], axis=1)
         size = len(cloud.nodes)
         return cls(0.5 * np.abs(ax * by - ay * bx), corners, scipy.sparse.csr_array((length, (i, j)), (size, size)))

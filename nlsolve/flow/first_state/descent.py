@@ -14,13 +14,13 @@ import numpy as np
 from pydantic import TypeAdapter
 
 from nlsolve.contracts.continuum.discretizer import Discretizer
+from nlsolve.contracts.continuum.law import ConstitutiveLaw
 from nlsolve.contracts.nonlinear_solver import NonlinearSolver
 from nlsolve.contracts.outcome import Outcome
 from nlsolve.contracts.rules.refresh import RefreshRule
 from nlsolve.contracts.scene import Preparation, Solve
 from nlsolve.contracts.status import SolveError, Status
 from nlsolve.flow.continuation import Solves, Stage
-from nlsolve.flow.incompressibility import iterate_pressure
 from nlsolve.flow.momentum import Flow
 from nlsolve.flow.state import FlowParts, FlowState
 from nlsolve.registry.nested import AnyDiscretizer, AnyRefresh, AnySolver
@@ -44,36 +44,36 @@ def may_descend(parts: FlowParts, stages: list[Stage]) -> bool:
     return parts.start.is_free and len(stages) > 1 and parts.physics.penalty_unit != "local"
 
 
-def descent(state: FlowState) -> Solves:
-    """Yields the problems of the way from rest; the outcome of the last. It has failed where the nodes carry no
-    triangles.
+def descent(state: FlowState, law: ConstitutiveLaw) -> Solves:
+    """Yields the problems of the way from rest to the flow by this law on linear triangles, from which `arrival` leads
+    to that of the case; the outcome of the last. It has failed where the nodes carry no triangles.
     """
-    parts = state.parts
-    most = min(MOST, parts.budget.iterations)
-    target = state.flow_of(parts.law)
     try:
-        easier = by_triangles(state, target)
+        easier = by_triangles(state, law)
     except SolveError as refusal:
         return Outcome(refusal.status, refusal.detail, np.zeros(0), np.nan)
     for tolerance in TOLERANCES:
-        preparation = Preparation(parts.start.method(easier), tolerance, most)
+        preparation = Preparation(state.parts.start.method(easier), tolerance, most_iterations(state))
         outcome = yield Solve(easier, easier.unknowns(state.guess), preparation=preparation)
         if outcome.status is not Status.CONVERGED:
             return outcome
-    return (yield from iterate_pressure(state, lambda: arrival(state, most)))
+    return outcome
 
 
-def by_triangles(state: FlowState, target: Flow) -> Flow:
-    """The flow by linear triangles: `target` itself where these are the case's. May raise SolveError (bad cloud)."""
+def most_iterations(state: FlowState) -> int:
+    """Iterations of one solve on this way."""
+    return min(MOST, state.parts.budget.iterations)
+
+
+def by_triangles(state: FlowState, law: ConstitutiveLaw) -> Flow:
+    """The flow by linear triangles. May raise SolveError (bad cloud)."""
     triangles = TRIANGLES.validate_python({"kind": "delaunay"})
-    if state.discretizer == triangles:
-        return target
-    return state.discretized_by(triangles).flow_of(state.parts.law)
+    return (state if state.discretizer == triangles else state.discretized_by(triangles)).flow_of(law)
 
 
-def arrival(state: FlowState, most: int) -> Solves:
-    """Yields the flow with the state so far for its start, which is near the solution."""
-    flow, start = state.flow_of(state.parts.law), state.parts.start
+def arrival(state: FlowState, law: ConstitutiveLaw, most: int) -> Solves:
+    """Yields the flow by this law with the state so far for its start, which is near the solution."""
+    flow, start = state.flow_of(law), state.parts.start
     solver = METHOD.validate_python({"kind": "newton-krylov"})
     refresh = RULE.validate_python(solver.default_refresh)
     return (

@@ -16,8 +16,16 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 
-from nlsolve.plugin import Cloud, PointOperators, SolveError, Status, hat_gradients
-from nlsolve_discretizers.weights import delaunay
+from nlsolve.plugin import (
+    Cloud,
+    PointOperators,
+    SolveError,
+    Status,
+    doubled_areas,
+    hat_gradients,
+    on_one_wall,
+    side_keys,
+)
 from nlsolve_discretizers.weights.assembly import rows_times
 
 
@@ -40,16 +48,15 @@ class Triangles:
 
         Raises SolveError (bad cloud) if the nodes lie on one line or a node belongs to no triangle.
         """
-        return cls._of(cloud, delaunay.found(cloud.nodes))
+        return cls._of(cloud, cloud.triangulation)
 
     def renewed(self, cloud: Cloud) -> Triangles:
         """The triangulation of a cloud whose nodes have moved, as `of` gives it; after a small motion in less time."""
-        whole = delaunay.kept(self.whole, cloud.nodes, _walls(cloud))
-        return self.of(cloud) if whole is None else self._of(cloud, whole)
+        return self._of(cloud, cloud.triangulated_from(self.whole))
 
     @classmethod
     def _of(cls, cloud: Cloud, whole: np.ndarray) -> Triangles:
-        triangles = cls(cloud, whole[~delaunay.on_one_wall(_walls(cloud)[whole.T])], whole)
+        triangles = cls(cloud, whole[~on_one_wall(cloud.walls[whole.T])], whole)
         if np.bincount(triangles.corners.ravel(), minlength=len(cloud.nodes))[cloud.interior].min(initial=1) == 0:
             raise SolveError(Status.BAD_CLOUD, "a node belongs to no triangle of the cloud: it coincides with another")
         return triangles
@@ -66,14 +73,14 @@ class Triangles:
     @cached_property
     def areas(self) -> np.ndarray:
         """Area of each triangle [mm²]."""
-        return 0.5 * delaunay.doubled_areas(*np.ascontiguousarray(self.cloud.nodes.T), *self.corners.T)
+        return 0.5 * doubled_areas(*np.ascontiguousarray(self.cloud.nodes.T), *self.corners.T)
 
     @cached_property
     def edges(self) -> tuple[np.ndarray, np.ndarray]:
         """Edges (E, 2), each once, smaller node first, and for each the triangles beside it (E, 2), −1 for none."""
         if self.found is not None:
             return self.found.edges
-        key = delaunay.side_keys(self.corners, len(self.cloud.nodes))
+        key = side_keys(self.corners, len(self.cloud.nodes))
         order = np.argsort(key, kind="stable")
         key = key[order]
         first = np.flatnonzero(np.diff(key, prepend=-1))
@@ -183,14 +190,6 @@ def _means(values: np.ndarray, index: np.ndarray) -> np.ndarray:
     for column in index.T[1:]:
         total += values[column]
     return total / index.shape[1]
-
-
-def _walls(cloud: Cloud) -> np.ndarray:
-    """The number of the boundary of each node, (N,), 0 inside."""
-    walls = np.zeros(len(cloud.nodes), dtype=int)
-    for number, members in enumerate(cloud.boundaries.values(), start=1):
-        walls[members] = number
-    return walls
 
 
 @dataclass(frozen=True)

@@ -433,8 +433,22 @@ class TestPardiso:
         symmetric, general = (
             Pardiso(symmetric=kind).factorize(tangent("conservative")) for kind in ("detect", "never")
         )
-        assert (symmetric.ordering, general.ordering) == ("metis, ldlt", "metis, lu")
+        assert (symmetric.ordering, general.ordering) == ("metis, llt", "metis, lu")
         assert symmetric.fill < 0.7 * general.fill
+
+    def test_a_matrix_that_is_not_positive_definite_has_factors_with_pivots(self) -> None:
+        """What precedes it may have been definite, and then asks for its own once more."""
+        definite = sp.csr_array(np.array([[2.0, 1.0, 1.0], [1.0, 3.0, 1.0], [1.0, 1.0, 2.0]]))
+        other = definite.copy()
+        other.data[[1, 3]] = 4.0
+        rhs = np.arange(3.0)
+        first = Pardiso().factorize(definite)
+        second = Pardiso().factorize(other, first)
+        third = Pardiso().factorize(definite, second)
+        assert [factors.ordering for factors in (first, second, third)] == ["metis, llt", "metis, ldlt", "metis, ldlt"]
+        assert [factors.attempts for factors in (first, second, third)] == [1, 2, 1]
+        for factors, matrix in ((first, definite), (second, other), (third, definite)):
+            np.testing.assert_allclose(matrix @ factors.solve(rhs), rhs, atol=1e-14)
 
     @pytest.mark.parametrize("symmetric", [True, False])
     def test_a_matrix_without_a_null_vector_of_its_own_is_refused(self, symmetric: bool) -> None:

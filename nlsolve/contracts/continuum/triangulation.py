@@ -12,13 +12,14 @@ from __future__ import annotations
 import numpy as np
 import scipy
 
-from nlsolve.plugin import SolveError, Status
+from nlsolve.contracts.status import SolveError, Status
+from nlsolve.series import Array, Indices, Mask
 
 TIE = 1e-11  # relative to the size of the coordinates: four nodes are on one circle, as far as rounding can tell
 MOST_ROUNDS = 20  # of flips, before the triangulation is found anew
 
 
-def found(nodes: np.ndarray) -> np.ndarray:
+def found(nodes: Array) -> Indices:
     """Corners (T, 3) of the triangles of `nodes` (N, 2), counter-clockwise, in the order of `ordered`.
 
     Raises SolveError (bad cloud) if the nodes lie on one line.
@@ -29,7 +30,7 @@ def found(nodes: np.ndarray) -> np.ndarray:
         raise SolveError(Status.BAD_CLOUD, "the nodes lie on one line: they span no triangles") from error
 
 
-def ordered(corners: np.ndarray) -> np.ndarray:
+def ordered(corners: Indices) -> Indices:
     """The triangles with their least corner first, in the order of their corners: no trace of how they were found."""
     a, b, c = np.ascontiguousarray(corners.T)
     count, from_a, from_b = np.int64(corners.max()) + 1, (a < b) & (a < c), b < c
@@ -40,13 +41,45 @@ def ordered(corners: np.ndarray) -> np.ndarray:
     return turned[np.argsort((a * count + b) * count + c)]
 
 
-def side_keys(corners: np.ndarray, nodes: int) -> np.ndarray:
+def edges_of(corners: Indices) -> Indices:
+    """The edges (E, 2) of triangles (T, 3), each once, the smaller node first, in the order of their nodes."""
+    count = int(corners.max(initial=0)) + 1
+    return np.stack(np.divmod(np.unique(side_keys(corners, count)), count), axis=1)
+
+
+def subdivided(corners: Indices, edges: Indices, first: int) -> Indices:
+    """The triangles (T, 3), cut from the middles of those of their sides that are among the `edges` (E, 2) to the other
+    ones, or to the corner in front of them; the node in the middle of edge e has the number `first` + e.
+    """
+    keys = np.minimum(*edges.T) * first + np.maximum(*edges.T)
+    order = np.argsort(keys)
+    asked = side_keys(corners, first)
+    at = np.minimum(np.searchsorted(keys, asked, sorter=order), len(keys) - 1)
+    middles = np.where(keys[order[at]] == asked, first + order[at], -1).reshape(-1, 3)
+    cut = middles >= 0
+    count = cut.sum(axis=1)
+    # The side from a to b is cut where one is, that from c to a is not where two are.
+    turn = np.where(count == 1, cut.argmax(axis=1), np.where(count == 2, (~cut).argmax(axis=1) + 1, 0))
+    turned = (turn[:, None] + np.arange(3)) % 3
+    a, b, c = np.take_along_axis(corners, turned, axis=1).T
+    ab, bc, ca = np.take_along_axis(middles, turned, axis=1).T
+    by_count = {
+        0: [(a, b, c)],
+        1: [(a, ab, c), (ab, b, c)],
+        2: [(ab, b, bc), (a, ab, bc), (a, bc, c)],
+        3: [(a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca)],
+    }
+    parts = [np.stack(nodes, axis=1)[count == cuts] for cuts, each in by_count.items() for nodes in each]
+    return np.concatenate(parts)
+
+
+def side_keys(corners: Indices, nodes: int) -> Indices:
     """A number for each side ab, bc, ca of each triangle, (3T,): smaller node times `nodes` plus the larger one."""
     start, end = corners.ravel(), corners[:, [1, 2, 0]].ravel()
     return np.minimum(start, end) * nodes + np.maximum(start, end)
 
 
-def kept(corners: np.ndarray, nodes: np.ndarray, walls: np.ndarray) -> np.ndarray | None:
+def kept(corners: Indices, nodes: Array, walls: Indices) -> Indices | None:
     """The triangles that `found` would give, by flips in those of before (T, 3); None where these do not lead there.
 
     walls : (N,), the number of the wall of each node, 0 inside.
@@ -75,12 +108,12 @@ def kept(corners: np.ndarray, nodes: np.ndarray, walls: np.ndarray) -> np.ndarra
     return None
 
 
-def doubled_areas(x: np.ndarray, y: np.ndarray, a: np.ndarray, b: np.ndarray, c: np.ndarray) -> np.ndarray:
+def doubled_areas(x: Array, y: Array, a: Indices, b: Indices, c: Indices) -> Array:
     """Twice the signed areas of the triangles abc of nodes at x, y (N,)."""
     return (x[b] - x[a]) * (y[c] - y[a]) - (y[b] - y[a]) * (x[c] - x[a])
 
 
-def quadrilaterals(corners: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def quadrilaterals(corners: Indices) -> tuple[Indices, Indices, Indices]:
     """For every inner edge ab the nodes a, b, c, d (4, E) of the triangles abc and bad, and these two (2, E); and the
     edges (2, H) of the hull. All go counter-clockwise.
     """
@@ -96,7 +129,7 @@ def quadrilaterals(corners: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndar
     return quads, np.stack([one // 3, other // 3]), np.stack([start[single], end[single]])
 
 
-def _in_circle(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _in_circle(x: Array, y: Array) -> tuple[Array, Array]:
     """A determinant that is positive where d lies inside the circle of abc, for quadrilaterals at x, y (4, E), and the
     square of the largest distance from d.
 
@@ -108,20 +141,22 @@ def _in_circle(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return determinant, np.maximum(np.maximum(a, b), c)
 
 
-def on_one_wall(walls: np.ndarray) -> np.ndarray:
+def on_one_wall(walls: Indices) -> Mask:
     """Which of the polygons with nodes on `walls` (corners, E) have all of them on one and the same."""
-    return (walls[0] > 0) & (walls == walls[0]).all(axis=0)
+    same: Mask = (walls[0] > 0) & (walls == walls[0]).all(axis=0)
+    return same
 
 
-def _alone(beside: np.ndarray, triangles: int) -> np.ndarray:
+def _alone(beside: Indices, triangles: int) -> Mask:
     """Which of the edges with triangles `beside` (2, E) are the first of both of these: no two share a triangle."""
     number = np.arange(beside.shape[1])
     first = np.full(triangles, len(number))
     np.minimum.at(first, beside.ravel(), np.tile(number, 2))
-    return (first[beside] == number).all(axis=0)
+    alone: Mask = (first[beside] == number).all(axis=0)
+    return alone
 
 
-def _is_convex(hull: np.ndarray, x: np.ndarray, y: np.ndarray, walls: np.ndarray, tie: float) -> bool:
+def _is_convex(hull: Indices, x: Array, y: Array, walls: Indices, tie: float) -> bool:
     """Whether the edges (2, H) of the hull turn left at every node; along one wall they may go straight on."""
     following = np.zeros(len(x), dtype=np.intp)
     following[hull[0]] = hull[1]
