@@ -24,7 +24,7 @@ from nlsolve_solvers.modified_newton import ModifiedNewton
 from pydantic import ValidationError
 
 from nlsolve import SolveError, Status
-from nlsolve.flow.continuation import Start
+from nlsolve.flow.continuation import VALUES, Start
 from nlsolve.plugin import Cloud, NodeMotion, Operators, Physics, Recording, Step, TimeSteps
 from nlsolve.results.columns import FIELDS, RUNS, STEPS
 from nlsolve.solving.simulate import Progress, Record
@@ -84,7 +84,7 @@ def test_columns_are_those_documented() -> None:
 
 def test_continuation_is_counted_apart() -> None:
     direct = march(setup(StirringTool(nodes=COARSE), 0.3, start=Start(values=())))
-    led = march(setup(StirringTool(nodes=COARSE), 0.3))
+    led = march(setup(StirringTool(nodes=COARSE), 0.3, start=Start(values=VALUES)))
     assert direct.summary["start_factorizations"] == 0
     assert led.summary["start_factorizations"] > 0
     assert led.summary["start_triangular_solves"] == led.summary["start_factorizations"]

@@ -51,6 +51,8 @@ def subdivided(corners: Indices, edges: Indices, first: int) -> Indices:
     """The triangles (T, 3), cut from the middles of those of their sides that are among the `edges` (E, 2) to the other
     ones, or to the corner in front of them; the node in the middle of edge e has the number `first` + e.
     """
+    if not len(edges):
+        return corners
     keys = np.minimum(*edges.T) * first + np.maximum(*edges.T)
     order = np.argsort(keys)
     asked = side_keys(corners, first)
@@ -82,6 +84,8 @@ def side_keys(corners: Indices, nodes: int) -> Indices:
 def kept(corners: Indices, nodes: Array, walls: Indices) -> Indices | None:
     """The triangles that `found` would give, by flips in those of before (T, 3); None where these do not lead there.
 
+    Between nodes of one wall, where no flow is, they may be others.
+
     walls : (N,), the number of the wall of each node, 0 inside.
     """
     x, y = np.ascontiguousarray(nodes.T)
@@ -94,7 +98,7 @@ def kept(corners: Indices, nodes: Array, walls: Indices) -> Indices | None:
         if not flipped and not _is_convex(hull, x, y, walls, tie):
             return None
         inside, size = _in_circle(x[quads], y[quads])
-        wrong = np.flatnonzero(inside > tie * size)
+        wrong = np.flatnonzero((inside > tie * size) & ~on_one_wall(walls[quads]))
         if not len(wrong):
             return ordered(corners) if flipped else corners
         chosen = wrong[_alone(beside[:, wrong], len(near))]
@@ -157,9 +161,9 @@ def _alone(beside: Indices, triangles: int) -> Mask:
 
 
 def _is_convex(hull: Indices, x: Array, y: Array, walls: Indices, tie: float) -> bool:
-    """Whether the edges (2, H) of the hull turn left at every node; along one wall they may go straight on."""
+    """Whether the edges (2, H) of the hull turn left at every node; along walls they may go straight on."""
     following = np.zeros(len(x), dtype=np.intp)
     following[hull[0]] = hull[1]
     corner = np.stack([*hull, following[hull[1]]])
-    least = np.where(on_one_wall(walls[corner]), -tie, tie)
+    least = np.where((walls[corner] > 0).all(axis=0), -tie, tie)
     return bool((doubled_areas(x, y, *corner) > least).all())

@@ -56,5 +56,5 @@ def test_linear_values_are_carried_exactly() -> None:
 def test_a_cloud_without_further_nodes_is_the_same() -> None:
     cloud = cloud_of(SCENES[2])
     same = enriched(cloud, np.empty((0, 2), dtype=int))
-    assert np.array_equal(same.cloud.nodes, cloud.nodes)
+    assert same.cloud is cloud
     assert np.array_equal(same.carry(cloud.nodes), cloud.nodes)

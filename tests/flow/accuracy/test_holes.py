@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+import scipy
 from cases import setup
 from clouds import CLOUDS
 from hypothesis import given, settings
@@ -13,6 +14,7 @@ from nlsolve_scenes import Cavity, Channel, Manufactured, StirringTool
 from nlsolve_scenes.nodes.rings import Rings
 
 from nlsolve.contracts.continuum.geometry import Geometry
+from nlsolve.contracts.continuum.triangulation import edges_of
 from nlsolve.flow.accuracy.holes import circumcentres, largest_hole, spacings
 from nlsolve.flow.validity import LIMITS
 from nlsolve.plugin import Cloud, ConstitutiveLaw
@@ -67,6 +69,20 @@ def test_a_hole_of_four_spacings_is_found_at_its_place(cloud: Cloud) -> None:
     assert holed.value > LIMIT
     assert "there is no node within " in holed.sentence
     assert "add nodes there" in holed.sentence
+
+
+@pytest.mark.parametrize("cloud", CLOUDS.values(), ids=CLOUDS)
+def test_it_is_the_largest_of_all_circles_whose_centres_lie_in_the_flow(cloud: Cloud) -> None:
+    """By SciPy's own search of the triangle around each centre."""
+    triangles = scipy.spatial.Delaunay(cloud.nodes)
+    corners = triangles.simplices
+    centres = circumcentres(cloud.nodes[corners])
+    in_flow = ~cloud.on_boundary[corners].all(axis=1)
+    at = triangles.find_simplex(np.nan_to_num(centres, nan=np.inf))
+    inside = in_flow & (at >= 0) & in_flow[at]
+    radii = np.linalg.norm(cloud.nodes[corners[:, 0]] - centres, axis=1)
+    ratios = radii / spacings(cloud.nodes, edges_of(corners))[corners].max(axis=1)
+    assert largest_hole(cloud).value == pytest.approx(ratios[inside].max(), rel=1e-9)
 
 
 @pytest.mark.parametrize(

@@ -13,7 +13,7 @@ from nlsolve_laws import HerschelBulkley, PowerLaw
 from nlsolve_linear.superlu import SuperLU
 from nlsolve_scenes import StirringTool
 from nlsolve_scenes.nodes.rings import Rings
-from nlsolve_solvers import Broyden, Picard
+from nlsolve_solvers import Broyden, Newton, Picard
 
 from nlsolve.contracts.outcome import Outcome
 from nlsolve.contracts.scene import Simulation, Solve
@@ -154,10 +154,30 @@ def test_a_way_that_is_left_open_is_taken(start: Start) -> None:
     assert may_descend(parts, start.stages(parts.law))
 
 
-def test_a_steady_scene_goes_by_continuation_for_its_own_method() -> None:
-    left_open, said = (run_case(case(time=TimeSteps(), start=start)).summary for start in (Start(), CONTINUED))
+@pytest.mark.parametrize("form", FORMS)
+def test_the_method_of_a_steady_scene_begins_where_the_continuation_would_lead_it(form: str) -> None:
+    """At n = 0.2, the stage before its own: its work and its result are the same, the way there is shorter."""
+    parts = case(time=TimeSteps(), discretizer=FORMS[form])
+    found, known = (run_case(replace(parts, start=start)).summary for start in (Start(), CONTINUED))
+    assert found["start_factorizations"] <= 0.65 * known["start_factorizations"]
+    for name in ("factorizations", "iterations", "residuals"):
+        assert found[name] == known[name]
+    assert found["velocity_error"] == pytest.approx(known["velocity_error"], rel=1e-6)
+
+
+def test_a_steady_scene_that_is_one_stage_from_the_linear_one_is_continued() -> None:
+    """n = 0.7, after n = 1."""
+    parts = case(time=TimeSteps(), law=PowerLaw(index=0.7))
+    found, known = (run_case(replace(parts, start=start)).summary for start in (Start(), CONTINUED))
     for name in ("start_factorizations", "factorizations", "iterations", "residual_norm", "velocity_error"):
-        assert left_open[name] == said[name]
+        assert found[name] == known[name]
+
+
+def test_a_pressure_is_iterated_by_the_method_of_a_steady_scene_alone() -> None:
+    parts = case(time=TimeSteps(), solver=Newton(), physics=Physics(penalty=30.0, divergence_tolerance=1e-3))
+    found, known = (run_case(replace(parts, start=start)).summary for start in (Start(), CONTINUED))
+    assert found["pressure_iterations"] == known["pressure_iterations"] > 0
+    assert found["velocity_error"] == pytest.approx(known["velocity_error"], rel=1e-6)
 
 
 # Where it fails.

@@ -9,7 +9,7 @@ import pytest
 from clouds import CLOUDS, jittered_points
 from nlsolve_discretizers import LinearTriangles, MovingLeastSquares, RadialBasis
 from nlsolve_discretizers.kernels.offsets import offsets
-from nlsolve_discretizers.weights import delaunay, least_squares
+from nlsolve_discretizers.weights import least_squares
 from nlsolve_discretizers.weights.least_squares import SOUND, fit
 from nlsolve_discretizers.weights.lists import Lists, largest_near
 from nlsolve_discretizers.weights.supports import Supports
@@ -97,75 +97,6 @@ def test_renewed_operators_are_refused_where_those_of_the_cloud_are() -> None:
 
 
 # Triangles.
-
-
-def annulus(rings: int) -> tuple[Array, Array]:
-    """Nodes on circles, inside a tool's and an outer wall's; and the number of the wall of each, 0 inside."""
-    nodes, walls = [], []
-    for i in range(rings):
-        radius = 1.0 + 0.2 * i
-        angle = np.linspace(0.0, 2.0 * np.pi, int(10.0 * np.pi * radius), endpoint=False) + 0.1 * i
-        nodes.append(radius * np.stack([np.cos(angle), np.sin(angle)], axis=1))
-        walls.append(np.full(len(angle), {0: 1, rings - 1: 2}.get(i, 0)))
-    return np.concatenate(nodes), np.concatenate(walls)
-
-
-def square(side: int) -> tuple[Array, Array]:
-    """A grid, all of whose squares have two diagonals; and the wall around it."""
-    x, y = (c.ravel() for c in np.meshgrid(np.arange(float(side)), np.arange(float(side))))
-    rim = (x == 0) | (x == side - 1) | (y == 0) | (y == side - 1)
-    return np.stack([x, y], axis=1), rim.astype(int)
-
-
-def inside(corners: Array, walls: Array) -> set[tuple[int, ...]]:
-    """The triangles that do not lie between nodes of one wall."""
-    return {tuple(three) for three in corners[~delaunay.on_one_wall(walls[corners.T])].tolist()}
-
-
-@pytest.mark.parametrize("shape", ["annulus", "square"])
-def test_flips_lead_to_the_triangulation_found_anew_or_nowhere(shape: str) -> None:
-    """Motions up to a spacing; smaller ones than these leave the squares of the grid undecided."""
-    led = 0
-    for seed, motion in enumerate(np.repeat(10.0 ** np.arange(-14.0 if shape == "annulus" else -6.0, 0.0), 6)):
-        nodes, walls = annulus(5 + seed % 4) if shape == "annulus" else square(5 + seed % 5)
-        shift = motion * np.random.default_rng(seed).standard_normal(nodes.shape)
-        shift[walls > 0] = 0.0
-        kept = delaunay.kept(delaunay.found(nodes), nodes + shift, walls)
-        if kept is not None:
-            led += 1
-            assert inside(kept, walls) == inside(delaunay.found(nodes + shift), walls)
-    assert led > (70 if shape == "annulus" else 25)
-
-
-def test_the_diagonal_of_a_square_stays_until_the_motion_decides() -> None:
-    """Four nodes on a circle, far from the origin: rounding does not choose among their diagonals."""
-    nodes, walls = square(7)
-    nodes += 30.0
-    for seed in range(5):
-        before = delaunay.found(nodes)
-        shift = 1e-13 * np.random.default_rng(seed).standard_normal(nodes.shape)
-        kept = delaunay.kept(before, nodes + shift, walls)
-        assert kept is not None
-        np.testing.assert_array_equal(kept, before)
-
-
-def test_a_hull_that_goes_straight_on_inside_is_found_anew() -> None:
-    """It may have a triangle more or less; along a wall such a triangle is left out."""
-    nodes, walls = square(5)
-    corners = delaunay.found(nodes)
-    assert delaunay.kept(corners, nodes, walls) is not None
-    assert delaunay.kept(corners, nodes, np.zeros_like(walls)) is None
-
-
-def test_a_triangle_turned_inside_out_and_a_hull_that_caves_in_have_all_found_anew() -> None:
-    nodes = jittered_points(3)
-    walls, corners = np.zeros(len(nodes), dtype=int), delaunay.found(nodes)
-    mirrored = nodes * [-1.0, 1.0]
-    assert delaunay.kept(corners, mirrored, walls) is None
-    outermost = int(nodes[:, 0].argmax())
-    caved = nodes.copy()
-    caved[outermost, 0] -= 0.15
-    assert delaunay.kept(corners, caved, walls) is None
 
 
 def test_triangles_bear_no_trace_of_how_they_were_found() -> None:
