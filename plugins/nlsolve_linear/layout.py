@@ -69,10 +69,8 @@ class Layout:
     def upper(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Of the entries on and above the diagonal: numbers among the sorted ones, columns, and starts of rows."""
         rows = np.repeat(np.arange(len(self.starts) - 1, dtype=self.columns.dtype), np.diff(self.starts))
-        above = self.columns >= rows
-        numbers = np.flatnonzero(above)
-        starts = np.concatenate([[0], np.cumsum(above)])[self.starts].astype(self.starts.dtype)
-        return numbers, self.columns[numbers], starts
+        numbers = np.flatnonzero(self.columns >= rows)
+        return numbers, self.columns[numbers], np.searchsorted(numbers, self.starts).astype(self.starts.dtype)
 
     def upper_of(self, matrix: Any) -> Any:
         """The entries on and above the diagonal of a sorted matrix of this pattern."""

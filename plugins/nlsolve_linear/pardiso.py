@@ -42,8 +42,8 @@ ACCURATE = 1e-9
 """Largest ‖b − A x‖ over the size of its terms of factors that solve what they were made for."""
 
 REACHED = 1e-6
-"""The same over ‖b‖ where a pivot was perturbed or, in LLᵀ, may be mere rounding: a singular matrix does not reach every
-b.
+"""The same over ‖b‖ where a pivot was perturbed or, in LLᵀ, may be mere rounding: a singular matrix does not reach
+every b.
 """
 
 SINGULAR = 1.0 / float(np.finfo(float).eps)

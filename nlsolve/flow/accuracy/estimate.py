@@ -10,9 +10,10 @@ The pressure that the penalty has built up is given to both beside the penalty, 
 compressibility is a small part of what it was: V* − V has the error of the penalty in it too (a step of Uzawa 1958;
 Fortin & Glowinski 1983).
 
-Newton's steps, all with the factors of the first tangent (`kept_factors`), end when a correction is small beside the
-way gone. Where the flow has a potential it falls at each step (`energy`): at n = 0.05 a residual made to fall instead
-cuts the steps so short that they end far from the solution. None of this is counted with the work of the method.
+Newton's steps, two with each tangent and all with the factors of the first (`kept_factors`), end when a correction is
+small beside the way gone. Where the flow has a potential it falls at each step (`energy`): at n = 0.05 a residual made
+to fall instead cuts the steps so short that they end far from the solution. None of this is counted with the work of
+the method.
 """
 
 from __future__ import annotations
@@ -22,18 +23,26 @@ from itertools import islice
 from typing import Any
 
 import numpy as np
+from pydantic import TypeAdapter
 
 from nlsolve.contracts.continuum.discretizer import Discretizer
 from nlsolve.contracts.linear_solver import Factors, LinearSolver
+from nlsolve.contracts.rules.refresh import RefreshRule
 from nlsolve.contracts.status import SolveError, Status
 from nlsolve.flow.accuracy.enrichment import Completed, Finer, enriched, twice_as_fine
 from nlsolve.flow.accuracy.kept_factors import KeptFactors
 from nlsolve.flow.momentum import Flow
 from nlsolve.flow.state import FlowState
+from nlsolve.registry.nested import AnyRefresh
 from nlsolve.series import Array
 from nlsolve.solving.tangent import Tangent
 from nlsolve.solving.work.counted_problem import CountedProblem
 from nlsolve.solving.work.ledger import Ledger
+
+RENEWED: TypeAdapter[RefreshRule] = TypeAdapter(AnyRefresh)
+"""Looks up the rule by which tangents are renewed when an estimate begins: plugins may still be being imported now."""
+
+STEPS_WITH_EACH = 2
 
 MOST_STEPS = 20
 """Newton steps after which the flow counts as unsolved on the enriched cloud."""
@@ -130,7 +139,8 @@ def _solution(
 def _solved(flow: Flow, start: Array, state: FlowState, work: Ledger) -> Array:
     """R(u) = 0 from `start` (U,), to the accuracy that an estimate needs. Raises SolveError."""
     linear = KeptFactors(linear=_Counted(state.parts.linear.for_one_matrix(), work))
-    problem, tangent = CountedProblem(flow, Ledger()), Tangent(linear, None, Ledger())
+    rule = RENEWED.validate_python({"kind": "every-m", "m": STEPS_WITH_EACH})
+    problem, tangent = CountedProblem(flow, Ledger()), Tangent(linear, rule, Ledger())
     last, forces = start, np.linalg.norm(flow.residual(start))
     if forces <= SOLVED * flow.scale(start):
         return start

@@ -10,6 +10,8 @@ without a potential, ‖R_Δ‖ falls instead.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from pydantic import TypeAdapter
 
@@ -44,7 +46,7 @@ def may_descend(parts: FlowParts, stages: list[Stage]) -> bool:
     return parts.start.is_free and len(stages) > 1 and parts.physics.penalty_unit != "local"
 
 
-def descent(state: FlowState, law: ConstitutiveLaw) -> Solves:
+def descent(state: FlowState, law: ConstitutiveLaw, tolerances: Sequence[float] = TOLERANCES) -> Solves:
     """Yields the problems of the way from rest to the flow by this law on linear triangles, from which `arrival` leads
     to that of the case; the outcome of the last. It has failed where the nodes carry no triangles.
     """
@@ -52,7 +54,7 @@ def descent(state: FlowState, law: ConstitutiveLaw) -> Solves:
         easier = by_triangles(state, law)
     except SolveError as refusal:
         return Outcome(refusal.status, refusal.detail, np.zeros(0), np.nan)
-    for tolerance in TOLERANCES:
+    for tolerance in tolerances:
         preparation = Preparation(state.parts.start.method(easier), tolerance, most_iterations(state))
         outcome = yield Solve(easier, easier.unknowns(state.guess), preparation=preparation)
         if outcome.status is not Status.CONVERGED:
@@ -67,8 +69,17 @@ def most_iterations(state: FlowState) -> int:
 
 def by_triangles(state: FlowState, law: ConstitutiveLaw) -> Flow:
     """The flow by linear triangles. May raise SolveError (bad cloud)."""
-    triangles = TRIANGLES.validate_python({"kind": "delaunay"})
-    return (state if state.discretizer == triangles else state.discretized_by(triangles)).flow_of(law)
+    return (state if is_by_triangles(state) else state.discretized_by(linear_triangles())).flow_of(law)
+
+
+def is_by_triangles(state: FlowState) -> bool:
+    """Whether linear triangles are the discretizer of the case."""
+    return state.discretizer == linear_triangles()
+
+
+def linear_triangles() -> Discretizer:
+    """The discretizer of the descent."""
+    return TRIANGLES.validate_python({"kind": "delaunay"})
 
 
 def arrival(state: FlowState, law: ConstitutiveLaw, most: int) -> Solves:

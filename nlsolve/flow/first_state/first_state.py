@@ -13,7 +13,14 @@ from nlsolve.flow.accuracy.adaptation import Adaptation
 from nlsolve.flow.accuracy.enrichment import carried
 from nlsolve.flow.accuracy.estimate import UNKNOWN, compared
 from nlsolve.flow.continuation import Solves, Stage, walk
-from nlsolve.flow.first_state.descent import arrival, descent, may_descend, most_iterations
+from nlsolve.flow.first_state.descent import (
+    TOLERANCES,
+    arrival,
+    descent,
+    is_by_triangles,
+    may_descend,
+    most_iterations,
+)
 from nlsolve.flow.incompressibility import iterate_pressure
 from nlsolve.flow.momentum import Flow
 from nlsolve.flow.state import FlowState
@@ -87,8 +94,10 @@ class FirstState:
         return may_descend(self.state.parts, stages) and (not self.leaves_last or len(stages) >= FAR)
 
     def descend(self, stages: list[Stage]) -> Solves:
-        """To the last stage, or to the one before it."""
+        """To the last stage, or to the one before it, with a tangent there whose pattern the method goes on with."""
         state, law = self.state, stages[-2 if self.leaves_last else -1].law
+        if self.leaves_last and is_by_triangles(state):
+            return (yield from descent(state, law, (*TOLERANCES, state.parts.start.tolerance)))
         outcome = yield from descent(state, law)
         if outcome.status is not Status.CONVERGED:
             return outcome
