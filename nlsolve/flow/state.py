@@ -196,18 +196,27 @@ class FlowState:
         there.operators, there.pressure, there.others = self.others[discretizer], None, {}
         return there
 
+    def at_rest_on(self, cloud: Cloud, discretizer: Discretizer) -> FlowState:
+        """This flow at rest on another cloud by a discretizer that may be another one, without a pressure and without
+        what has been accumulated. May raise SolveError (bad cloud).
+        """
+        there = copy(self)
+        there.cloud, there.discretizer, there.moving, there.others = cloud, discretizer, None, {}
+        there.pressure = there.drift = None
+        same = discretizer == self.discretizer and len(cloud.nodes) == len(self.cloud.nodes)
+        there.operators = self.operators if same else discretizer.operators(cloud, self.volumetric)
+        there.gradient = None if self.gradient is None else discretizer.gradient(cloud)
+        there.to_rest()
+        return there
+
     def enriched(self, finer: Finer, discretizer: Discretizer, velocity: Array) -> FlowState:
         """This flow, solved last with `velocity` (N, 2), on a finer cloud by a discretizer that may be another one.
 
         The pressure there is the one that the penalty has built up here. May raise SolveError (bad cloud).
         """
         assert self.flow is not None
-        there = copy(self)
-        there.cloud, there.moving, there.others = finer.cloud, None, {}
+        there = self.at_rest_on(finer.cloud, discretizer)
         there.velocity = there.guess = finer.carry(velocity)
-        same = discretizer == self.discretizer and len(finer.cloud.nodes) == len(self.cloud.nodes)
-        there.operators = self.operators if same else discretizer.operators(finer.cloud, self.volumetric)
-        there.gradient = None if self.gradient is None else discretizer.gradient(finer.cloud)
         pressure = self.flow.pressure(self.flow.unknowns(velocity))
         if pressure is not None:
             there.pressure = self.between_volume_points(self.operators, there.operators) @ pressure

@@ -5,12 +5,13 @@
 
 Φ is convex, so that the first line cannot fail, and no other matrix of these nodes is as cheap. Its solution is an
 error of discretisation away from that of the second line, which one K* reaches as a rule. Where convection leaves R_Δ
-without a potential, ‖R_Δ‖ falls instead.
+without a potential, ‖R_Δ‖ falls instead. With many nodes the first line begins with its own solution on fewer of them
+(`nested`).
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Generator, Sequence
 
 import numpy as np
 from pydantic import TypeAdapter
@@ -23,12 +24,20 @@ from nlsolve.contracts.rules.refresh import RefreshRule
 from nlsolve.contracts.scene import Preparation, Solve
 from nlsolve.contracts.status import SolveError, Status
 from nlsolve.flow.continuation import Solves, Stage
+from nlsolve.flow.first_state.thinning import Thinned
 from nlsolve.flow.momentum import Flow
 from nlsolve.flow.state import FlowParts, FlowState
 from nlsolve.registry.nested import AnyDiscretizer, AnyRefresh, AnySolver
+from nlsolve.series import Array
 
 TOLERANCES = (1e-2, 1e-6)
 """‖R_Δ‖ over its forces at rest, and then over those of the flow that this has led to, which may be far smaller."""
+
+TOLERANCES_ON_FEWER = (1e-2, 1e-3)
+"""The same for a flow whose solution is a guess."""
+
+MANY = 4000
+"""Nodes from which on a descent begins on fewer of them."""
 
 MOST = 60
 """Iterations of one solve, after which this way is given up for the continuation."""
@@ -54,12 +63,32 @@ def descent(state: FlowState, law: ConstitutiveLaw, tolerances: Sequence[float] 
         easier = by_triangles(state, law)
     except SolveError as refusal:
         return Outcome(refusal.status, refusal.detail, np.zeros(0), np.nan)
+    state.guess = yield from first_guess(state, law)
     for tolerance in tolerances:
         preparation = Preparation(state.parts.start.method(easier), tolerance, most_iterations(state))
         outcome = yield Solve(easier, easier.unknowns(state.guess), preparation=preparation)
         if outcome.status is not Status.CONVERGED:
             return outcome
+        state.guess = easier.velocity(outcome.state)
     return outcome
+
+
+def first_guess(state: FlowState, law: ConstitutiveLaw) -> Generator[Solve, Outcome, Array]:
+    """Yields the problems of a descent on fewer nodes, if there are many; its velocity at these nodes (N, 2), or rest.
+
+    From there a few steps of Newton's method are left (nested iteration: Kronsjö & Dahlquist 1972; Hackbusch 1985).
+    """
+    rest = np.zeros_like(state.cloud.nodes)
+    if len(state.cloud.nodes) < MANY:
+        return rest
+    try:
+        with state.entry("operators"):
+            fewer = Thinned.of(state.cloud)
+        there = state.at_rest_on(fewer.cloud, linear_triangles())
+    except SolveError:  # where fewer nodes carry no triangles, all of them begin at rest
+        return rest
+    outcome = yield from descent(there, law, TOLERANCES_ON_FEWER)
+    return fewer.carry(there.guess) if outcome.status is Status.CONVERGED else rest
 
 
 def most_iterations(state: FlowState) -> int:

@@ -20,7 +20,8 @@ from nlsolve.contracts.scene import Simulation, Solve
 from nlsolve.contracts.status import SolveError, Status
 from nlsolve.flow.continuation import VALUES, Start
 from nlsolve.flow.first_state import descent as descending
-from nlsolve.flow.first_state.descent import TOLERANCES, may_descend
+from nlsolve.flow.first_state.descent import TOLERANCES, TOLERANCES_ON_FEWER, may_descend
+from nlsolve.flow.first_state.thinning import Thinned
 from nlsolve.flow.march import FlowSimulation
 from nlsolve.flow.momentum import Flow
 from nlsolve.plugin import Cloud, Operators, Physics, TimeSteps
@@ -123,6 +124,37 @@ def test_convection_leaves_no_potential_and_the_way_is_the_same() -> None:
     known, _, _ = begun(case(physics=physics, start=CONTINUED))
     assert len(tasks) == len(TOLERANCES) + 1
     np.testing.assert_allclose(found, known, atol=1e-7 * np.abs(known).max())
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_many_nodes_begin_with_the_solution_on_fewer_of_them(form: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The same state; on all nodes a few steps are left, and on the fewest the descent begins at rest."""
+    parts = case(discretizer=FORMS[form], physics=Physics(penalty=1e2))
+    known, from_rest, _ = begun(parts)
+    monkeypatch.setattr(descending, "MANY", 150)
+    found, tasks, _ = begun(parts)
+    np.testing.assert_allclose(found, known, atol=1e-7 * np.abs(known).max())
+    unknowns = [len(task.start) for task in tasks]
+    assert len(tasks) == len(from_rest) + len(TOLERANCES_ON_FEWER)
+    assert unknowns == sorted(unknowns)
+    first, *_, last = [task.problem for task in tasks if len(task.start) == len(from_rest[0].start)]
+    assert isinstance(first, Flow)
+    assert isinstance(last, Flow)
+    rest = np.zeros(len(from_rest[0].start))
+    begins = next(task.start for task in tasks if task.problem is first)
+    assert np.linalg.norm(first.residual(begins)) < 0.1 * np.linalg.norm(first.residual(rest))
+
+
+def test_where_fewer_nodes_carry_no_flow_all_of_them_begin_at_rest(monkeypatch: pytest.MonkeyPatch) -> None:
+    def refused(cloud: Cloud) -> None:
+        raise SolveError(Status.BAD_CLOUD, "a node belongs to no triangle of the cloud")
+
+    known, tasks, _ = begun(case())
+    monkeypatch.setattr(descending, "MANY", 150)
+    monkeypatch.setattr(Thinned, "of", refused)
+    found, others, _ = begun(case())
+    assert len(others) == len(tasks)
+    np.testing.assert_array_equal(found, known)
 
 
 # Where it is not taken.
