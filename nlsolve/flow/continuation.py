@@ -56,9 +56,10 @@ class Start(SystemStart):
     in steps of log(`by`), which are halved when a stage fails and doubled when it was easy. With no values, the method
     of the case solves a steady scene from rest.
 
-    A march and adaptive nodes need no stages where at most a tolerance is given: Newton's method solves the flow by
-    linear triangles on the same nodes from rest, and from there Newton-Krylov with a kept tangent solves that of the
-    case. The continuation follows where this fails.
+    No stages are needed where at most a tolerance is given: Newton's method solves the flow by linear triangles on the
+    same nodes from rest (with many nodes from its solution on fewer of them), and from there Newton-Krylov with a kept
+    tangent solves that of the case; in a steady scene at the last value before the target, from where the method of the
+    case begins. The continuation follows where this fails.
 
     A march may also begin at rest: V = 0 inside at t = 0, on the boundary what is prescribed there, and nothing is
     solved before the first increment. What that costs is counted in the march; all `start_…` columns are 0.
