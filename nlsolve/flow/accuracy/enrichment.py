@@ -6,15 +6,22 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 import scipy
+import scipy.sparse as sp
 
 from nlsolve.contracts.continuum.cloud import Cloud
-from nlsolve.contracts.continuum.triangulation import edges_of, subdivided
+from nlsolve.contracts.continuum.triangulation import edges_of, on_one_wall, subdivided
 from nlsolve.contracts.continuum.walls import middles, wall_edges
 from nlsolve.series import Array, Indices
+
+FEW, MANY = 8, 64
+"""Triangles near a point among which the one that holds it is looked for, at first and then."""
+
+BEYOND = 1.0
+"""How far outside of its triangle a point may be, as a barycentric coordinate, for values to go on linearly there."""
 
 
 class Finer(Protocol):
@@ -37,7 +44,7 @@ class Completed:
 
     def carry(self, values: Array) -> Array:
         """Linear between the coarser cloud's nodes."""
-        return np.concatenate([values, carried(self.coarser, self.cloud)(values)[len(values) :]])
+        return carried(self.coarser, self.cloud)(values)
 
 
 @dataclass(frozen=True)
@@ -63,11 +70,9 @@ def inner_edges(cloud: Cloud) -> Indices:
 
 def enriched(cloud: Cloud, edges: Indices) -> Enriched:
     """The cloud with a node in the middle of each of these edges (E, 2); the cloud itself without any."""
-    return (
-        _with_nodes(cloud, edges, cloud.nodes[edges].mean(axis=1), cloud.boundaries)
-        if len(edges)
-        else Enriched(cloud, edges)
-    )
+    if not len(edges):
+        return Enriched(cloud, edges)
+    return _with_nodes(cloud, edges, cloud.nodes[edges].mean(axis=1), cloud.boundaries)
 
 
 def twice_as_fine(cloud: Cloud) -> Enriched:
@@ -92,12 +97,32 @@ def _with_nodes(cloud: Cloud, edges: Indices, places: Array, boundaries: Mapping
 
 
 def carried(here: Cloud, there: Cloud) -> Callable[[Array], Array]:
-    """Values (N, 2) at the nodes `here` -> at the nodes `there`: linear between nodes, the nearest beyond them."""
-    triangles = scipy.spatial.Delaunay(here.nodes)
-    nearest = here.tree.query(there.nodes)[1]
+    """Values (N, …) at the nodes `here` -> at the nodes `there`: linear on the triangles and a little beyond them, and
+    further away those of the nearest node.
+    """
+    corners = here.triangulation[~on_one_wall(here.walls[here.triangulation.T])]
+    tree = scipy.spatial.cKDTree(here.nodes[corners].mean(axis=1))
+    places, shares = _shares(here, corners, tree, there.nodes, FEW)
+    far = np.flatnonzero(shares.min(axis=1) < 0.0)
+    places[far], shares[far] = _shares(here, corners, tree, there.nodes[far], MANY)
+    away = np.flatnonzero(shares.min(axis=1) < -BEYOND)
+    places[away] = here.tree.query(there.nodes[away])[1][:, None]
+    shares[away] = 1.0 / 3.0
+    rows = np.repeat(np.arange(len(there.nodes)), 3)
+    weights = sp.csr_array((shares.ravel(), (rows, places.ravel())), shape=(len(there.nodes), len(here.nodes)))
+    return lambda values: weights @ values
 
-    def values(at_nodes: Array) -> Array:
-        between = scipy.interpolate.LinearNDInterpolator(triangles, at_nodes)(there.nodes)
-        return np.where(np.isnan(between), at_nodes[nearest], between)
 
-    return values
+def _shares(here: Cloud, corners: Indices, tree: Any, points: Array, count: int) -> tuple[Indices, Array]:
+    """Of the triangles with the `count` nearest centroids that in which the least barycentric coordinate of a point is
+    largest, so that it holds the point if one does: corners and coordinates, (P, 3).
+
+    tree : of the centroids of the triangles with these `corners` (T, 3).
+    """
+    _, near = tree.query(points, np.arange(1, min(count, len(corners)) + 1))
+    x, y = np.moveaxis(here.nodes[corners[near]] - points[:, None, None], 3, 0)  # (P, count, 3)
+    areas = np.stack([x[..., k - 2] * y[..., k - 1] - x[..., k - 1] * y[..., k - 2] for k in range(3)], axis=2)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        shares = np.nan_to_num(areas / areas.sum(axis=2, keepdims=True), nan=-np.inf)  # of slivers
+    best = np.arange(len(points)), shares.min(axis=2).argmax(axis=1)
+    return corners[near[best]], shares[best]

@@ -23,8 +23,9 @@ from nlsolve.contracts.outcome import Outcome
 from nlsolve.contracts.rules.refresh import RefreshRule
 from nlsolve.contracts.scene import Preparation, Solve
 from nlsolve.contracts.status import SolveError, Status
+from nlsolve.flow.accuracy.enrichment import carried
 from nlsolve.flow.continuation import Solves, Stage
-from nlsolve.flow.first_state.thinning import Thinned
+from nlsolve.flow.first_state.thinning import thinned
 from nlsolve.flow.momentum import Flow
 from nlsolve.flow.state import FlowParts, FlowState
 from nlsolve.registry.nested import AnyDiscretizer, AnyRefresh, AnySolver
@@ -83,12 +84,13 @@ def first_guess(state: FlowState, law: ConstitutiveLaw) -> Generator[Solve, Outc
         return rest
     try:
         with state.entry("operators"):
-            fewer = Thinned.of(state.cloud)
-        there = state.at_rest_on(fewer.cloud, linear_triangles())
+            fewer = thinned(state.cloud)
+            carry = carried(fewer, state.cloud)
+        there = state.at_rest_on(fewer, linear_triangles())
     except SolveError:  # where fewer nodes carry no triangles, all of them begin at rest
         return rest
     outcome = yield from descent(there, law, TOLERANCES_ON_FEWER)
-    return fewer.carry(there.guess) if outcome.status is Status.CONVERGED else rest
+    return carry(there.guess) if outcome.status is Status.CONVERGED else rest
 
 
 def most_iterations(state: FlowState) -> int:

@@ -4,12 +4,17 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+import scipy
+from clouds import CLOUDS
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from nlsolve_laws import PowerLaw
 from nlsolve_scenes import Channel, StirringTool
 from nlsolve_scenes.nodes.rings import GradedRings, Rings
 
 from nlsolve.contracts.continuum.geometry import Geometry
-from nlsolve.flow.accuracy.enrichment import enriched, inner_edges
+from nlsolve.flow.accuracy.enrichment import carried, enriched, inner_edges
+from nlsolve.flow.first_state.thinning import thinned
 from nlsolve.plugin import Cloud
 
 SCENES = [
@@ -58,3 +63,30 @@ def test_a_cloud_without_further_nodes_is_the_same() -> None:
     same = enriched(cloud, np.empty((0, 2), dtype=int))
     assert same.cloud is cloud
     assert np.array_equal(same.carry(cloud.nodes), cloud.nodes)
+
+
+@pytest.mark.parametrize("cloud", CLOUDS.values(), ids=CLOUDS)
+def test_linear_values_are_carried_exactly_from_fewer_nodes_and_beyond_them(cloud: Cloud) -> None:
+    fewer = thinned(cloud)
+    slopes, constant = np.array([[1.0, 2.0], [-3.0, 0.5]]), np.array([4.0, -1.0])
+    found = carried(fewer, cloud)(fewer.nodes @ slopes + constant)
+    np.testing.assert_allclose(found, cloud.nodes @ slopes + constant, atol=1e-9)
+
+
+@settings(max_examples=30, deadline=None)
+@given(st.integers(0, 2**32 - 1))
+def test_inside_the_values_are_those_of_scipys_linear_interpolation(seed: int) -> None:
+    """On ragged nodes, where the triangle of a point may be far larger than those beside it."""
+    random = np.random.default_rng(seed)
+    here = Cloud(random.uniform(size=(60, 2)) ** random.uniform(1.0, 3.0), {})
+    there = Cloud(random.uniform(size=(200, 2)), {})
+    values = random.standard_normal((60, 2))
+    known = scipy.interpolate.LinearNDInterpolator(here.nodes, values)(there.nodes)
+    inside = ~np.isnan(known).any(axis=1)
+    np.testing.assert_allclose(carried(here, there)(values)[inside], known[inside], atol=1e-9)
+
+
+def test_far_away_the_nearest_node_gives_its_values() -> None:
+    here = Cloud(np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]), {})
+    there = Cloud(np.array([[7.0, -1.0], [0.5, 0.5], [-0.1, 0.2]]), {})
+    np.testing.assert_allclose(carried(here, there)(np.array([1.0, 2.0, 3.0])), [2.0, 2.5, 1.3])

@@ -21,7 +21,6 @@ from nlsolve.contracts.status import SolveError, Status
 from nlsolve.flow.continuation import VALUES, Start
 from nlsolve.flow.first_state import descent as descending
 from nlsolve.flow.first_state.descent import TOLERANCES, TOLERANCES_ON_FEWER, may_descend
-from nlsolve.flow.first_state.thinning import Thinned
 from nlsolve.flow.march import FlowSimulation
 from nlsolve.flow.momentum import Flow
 from nlsolve.plugin import Cloud, Operators, Physics, TimeSteps
@@ -149,7 +148,7 @@ def test_where_fewer_nodes_carry_no_flow_all_of_them_begin_at_rest(monkeypatch: 
 
     known, tasks, _ = begun(case())
     monkeypatch.setattr(descending, "MANY", 150)
-    monkeypatch.setattr(Thinned, "of", refused)
+    monkeypatch.setattr(descending, "thinned", refused)
     found, others, _ = begun(case())
     assert len(others) == len(tasks)
     np.testing.assert_array_equal(found, known)

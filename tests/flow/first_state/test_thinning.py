@@ -1,4 +1,4 @@
-"""A quarter of the nodes, and what is linear between them."""
+"""A quarter of the nodes, no two of them neighbours."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import pytest
 from clouds import CLOUDS
 
 from nlsolve.contracts.continuum.triangulation import edges_of
-from nlsolve.flow.first_state.thinning import Thinned
+from nlsolve.flow.first_state.thinning import thinned
 from nlsolve.plugin import Cloud
 
 
@@ -19,7 +19,7 @@ def kept(cloud: Cloud, fewer: Cloud) -> np.ndarray:
 
 @pytest.mark.parametrize("cloud", CLOUDS.values(), ids=CLOUDS)
 def test_no_two_of_the_kept_nodes_are_neighbours_and_every_other_has_one(cloud: Cloud) -> None:
-    fewer = Thinned.of(cloud).cloud
+    fewer = thinned(cloud)
     keep, edges = kept(cloud, fewer), edges_of(cloud.triangulation)
     assert keep.sum() == len(fewer.nodes)
     assert not keep[edges].all(axis=1).any()
@@ -29,7 +29,7 @@ def test_no_two_of_the_kept_nodes_are_neighbours_and_every_other_has_one(cloud: 
 
 @pytest.mark.parametrize("cloud", CLOUDS.values(), ids=CLOUDS)
 def test_walls_are_thinned_among_themselves_and_keep_their_names(cloud: Cloud) -> None:
-    fewer = Thinned.of(cloud).cloud
+    fewer = thinned(cloud)
     assert set(fewer.boundaries) == set(cloud.boundaries)
     for name, group in cloud.boundaries.items():
         places = {tuple(place) for place in cloud.nodes[group].tolist()}
@@ -37,20 +37,6 @@ def test_walls_are_thinned_among_themselves_and_keep_their_names(cloud: Cloud) -
         assert {tuple(place) for place in fewer.nodes[fewer.boundaries[name]].tolist()} <= places
 
 
-@pytest.mark.parametrize("cloud", CLOUDS.values(), ids=CLOUDS)
-def test_what_is_linear_is_carried_exactly_and_kept_nodes_keep_their_values(cloud: Cloud) -> None:
-    """Beyond the outermost kept nodes it goes on linearly."""
-    thinned = Thinned.of(cloud)
-    slopes, constant = np.array([[1.0, 2.0], [-3.0, 0.5]]), np.array([4.0, -1.0])
-    np.testing.assert_allclose(
-        thinned.carry(thinned.cloud.nodes @ slopes + constant), cloud.nodes @ slopes + constant, atol=1e-9
-    )
-    values = np.random.default_rng(0).standard_normal(len(thinned.cloud.nodes))
-    _, number = thinned.cloud.tree.query(cloud.nodes)
-    keep = kept(cloud, thinned.cloud)
-    np.testing.assert_allclose(thinned.carry(values)[keep], values[number[keep]], atol=1e-9)
-
-
 def test_the_same_nodes_are_kept_each_time() -> None:
     cloud = CLOUDS["jittered"]
-    np.testing.assert_array_equal(Thinned.of(cloud).cloud.nodes, Thinned.of(cloud).cloud.nodes)
+    np.testing.assert_array_equal(thinned(cloud).nodes, thinned(cloud).nodes)
