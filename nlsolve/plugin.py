@@ -9,6 +9,7 @@ from nlsolve.contracts.continuum.cloud import Cloud, Exact, hat_gradients
 from nlsolve.contracts.continuum.discretizer import Discretizer, Operators, PointOperators
 from nlsolve.contracts.continuum.law import ConstitutiveLaw, PowerForm, local_index, stress, tangent_moduli
 from nlsolve.contracts.continuum.terms import NodeMotion, Physics, Recording, TimeSteps
+from nlsolve.contracts.continuum.near import largest_near
 from nlsolve.contracts.continuum.triangulation import doubled_areas, on_one_wall, side_keys
 from nlsolve.contracts.continuum.walls import middles as wall_middles
 from nlsolve.contracts.continuum.walls import wall_edges
@@ -91,6 +92,7 @@ __all__ = [
     "doubled_areas",
     "hat_gradients",
     "hookimpl",
+    "largest_near",
     "least_squares",
     "local_index",
     "norm",

@@ -19,7 +19,7 @@ class Near:
     """The nodes that are near each of N nodes.
 
     nodes : (N, 2) [mm].
-    listed : (N, k), other nodes near each one.
+    listed : (k, N), other nodes near each one.
     reach : (N,) [mm], every node that is not listed is at least so far away.
     distance : (N,) [mm], to the nearest node; infinite for a single one.
     """
@@ -34,19 +34,22 @@ class Near:
         """The nearest nodes by the tree of all."""
         count = min(LISTED, len(nodes) - 1)
         nothing = np.full(len(nodes), np.inf)
-        near = cls(nodes, np.zeros((len(nodes), count), np.intp), nothing, nothing.copy())
+        near = cls(nodes, np.zeros((count, len(nodes)), np.intp), nothing, nothing.copy())
         return near._filled(np.arange(len(nodes)), tree) if count else near
 
     def moved_to(self, nodes: Array, tree: Callable[[], scipy.spatial.cKDTree]) -> Near:
         """The same for the nodes at other places (N, 2); their tree is asked about those whose list may be too short.
 
-        |x_i − x_j| ≥ r_i − |δx_i| − max_j |δx_j| for all j that are not listed.
+        |x_i − x_j| ≥ r_i − |δx_i| − max_j |δx_j| for all j that are not listed; the maximum is over nodes near enough to
+        come so near.
         """
-        steps = np.linalg.norm(nodes - self.nodes, axis=1)
-        reach = self.reach - steps - steps.max(initial=0.0)
         x, y = np.ascontiguousarray(nodes.T)
-        squared = (x[self.listed] - x[:, None]) ** 2 + (y[self.listed] - y[:, None]) ** 2
-        distance = np.sqrt(squared.min(axis=1, initial=np.inf))
+        dx, dy = x - self.nodes[:, 0], y - self.nodes[:, 1]
+        steps = np.sqrt(dx * dx + dy * dy)
+        within = float(np.max(self.reach, where=np.isfinite(self.reach), initial=0.0)) + steps.max(initial=0.0)
+        reach = self.reach - steps - largest_near(self.nodes, steps, self.nodes, within)
+        dx, dy = x.take(self.listed) - x, y.take(self.listed) - y
+        distance = np.sqrt((dx * dx + dy * dy).min(axis=0, initial=np.inf))
         short = np.flatnonzero(~(distance < reach) & np.isfinite(reach))
         if not len(short):
             return Near(nodes, self.listed, reach, distance)
@@ -54,10 +57,31 @@ class Near:
 
     def _filled(self, which: Indices, tree: scipy.spatial.cKDTree) -> Near:
         """These, still in nobody's hands, with what the tree finds for the nodes `which`."""
-        count = self.listed.shape[1]
+        count = len(self.listed)
         distance, index = tree.query(
             self.nodes[which], np.arange(2, count + 2)
         )  # the nearest of all is the node itself
-        self.listed[which], self.distance[which] = index, distance[:, 0]
+        self.listed[:, which], self.distance[which] = index.T, distance[:, 0]
         self.reach[which] = distance[:, -1] if count < len(self.nodes) - 1 else np.inf
         return self
+
+
+def largest_near(places: Array, values: Array, targets: Array, within: float) -> Array:
+    """An upper bound, (T,), of the `values` ≥ 0 (P,) at all `places` (P, 2) that are no farther than `within` from each
+    of the `targets` (T, 2): the largest one in nine square cells around each, 0 where these are empty.
+    """
+    (x, y), (at_x, at_y) = places.T, targets.T
+    west, south = min(x.min(), at_x.min()), min(y.min(), at_y.min())
+    width, height = max(x.max(), at_x.max()) - west, max(y.max(), at_y.max()) - south
+    side = max(within, max(width, height) / len(places) ** 0.5)  # no more cells than places
+    if not side > 0.0:
+        return np.full(len(targets), values.max(initial=0.0))
+
+    def cell(x: Array, y: Array) -> tuple[Indices, Indices]:
+        return ((x - west) / side).astype(np.intp), ((y - south) / side).astype(np.intp)
+
+    cells = np.zeros((int(width / side) + 3, int(height / side) + 3))  # an empty row and column on either side
+    np.maximum.at(cells[1:-1, 1:-1], cell(x, y), values)
+    rows = np.maximum(np.maximum(cells[:-2], cells[1:-1]), cells[2:])
+    blocks: Array = np.maximum(np.maximum(rows[:, :-2], rows[:, 1:-1]), rows[:, 2:])[cell(at_x, at_y)]
+    return blocks

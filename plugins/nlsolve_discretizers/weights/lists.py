@@ -13,6 +13,7 @@ from functools import cached_property
 import numpy as np
 import scipy
 
+from nlsolve.plugin import largest_near
 from nlsolve_discretizers.kernels.ranking import ranked
 
 SPARE = 8
@@ -131,27 +132,6 @@ def _steps(before: np.ndarray, now: np.ndarray, numbers: np.ndarray | None) -> n
     if numbers is None:
         return np.linalg.norm(now - before, axis=1)
     return np.where(numbers < 0, 0.0, np.linalg.norm(now - before[numbers], axis=1))
-
-
-def largest_near(places: np.ndarray, values: np.ndarray, targets: np.ndarray, within: float) -> np.ndarray:
-    """An upper bound, (T,), of the `values` ≥ 0 (P,) at all `places` (P, 2) that are no farther than `within` from each
-    of the `targets` (T, 2): the largest one in nine square cells around each, 0 where these are empty.
-    """
-    (x, y), (at_x, at_y) = places.T, targets.T
-    west, south = min(x.min(), at_x.min()), min(y.min(), at_y.min())
-    width, height = max(x.max(), at_x.max()) - west, max(y.max(), at_y.max()) - south
-    side = max(within, max(width, height) / len(places) ** 0.5)  # no more cells than places
-    if not side > 0.0:
-        return np.full(len(targets), values.max(initial=0.0))
-
-    def cell(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        return ((x - west) / side).astype(np.intp), ((y - south) / side).astype(np.intp)
-
-    cells = np.zeros((int(width / side) + 3, int(height / side) + 3))  # an empty row and column on either side
-    np.maximum.at(cells[1:-1, 1:-1], cell(x, y), values)
-    rows = np.maximum(np.maximum(cells[:-2], cells[1:-1]), cells[2:])
-    blocks: np.ndarray = np.maximum(np.maximum(rows[:, :-2], rows[:, 1:-1]), rows[:, 2:])[cell(at_x, at_y)]
-    return blocks
 
 
 def _as_they_are(targets: int, sources: int) -> tuple[np.ndarray, np.ndarray]:

@@ -9,7 +9,7 @@ import pytest
 import scipy
 
 from nlsolve.contracts.continuum.cloud import Cloud
-from nlsolve.contracts.continuum.near import Near
+from nlsolve.contracts.continuum.near import Near, largest_near
 from nlsolve.contracts.status import SolveError
 from nlsolve.series import Array
 
@@ -50,6 +50,21 @@ def test_the_tree_is_asked_about_those_only_whose_lists_are_too_short(monkeypatc
     cloud = cloud.moved_to(moved)
     assert asked[1:] == [400]  # it may have come near any of them
     np.testing.assert_allclose(cloud.nearest_distance, by_tree(moved), rtol=1e-13)
+
+
+@pytest.mark.parametrize("within", [0.0, 0.05, 0.3, 2.0])
+def test_the_largest_value_near_a_target_is_that_of_a_place_near_it(within: float) -> None:
+    random = np.random.default_rng(3)
+    places, values = random.random((300, 2)) * [1.0, 0.2], random.random(300)
+    targets = random.random((90, 2)) * [1.2, 0.4] - 0.1
+    bound = largest_near(places, values, targets, within)
+    distance = np.linalg.norm(targets[:, None] - places, axis=2)
+    near = np.where(distance <= within, values, 0.0).max(axis=1)
+    side = max(within, 1.2 / 300**0.5)
+    not_far = np.where(distance < 8.0**0.5 * side * (1.0 + 1e-9), values, 0.0).max(axis=1)
+    assert (near <= bound).all()
+    assert (bound <= not_far).all()
+    assert largest_near(np.ones((1, 2)), np.ones(1), np.ones((1, 2)), 0.0) == 1.0
 
 
 def test_a_single_node_has_no_nearest_one() -> None:

@@ -11,7 +11,7 @@ from nlsolve_discretizers import LinearTriangles, MovingLeastSquares, RadialBasi
 from nlsolve_discretizers.kernels.offsets import offsets
 from nlsolve_discretizers.weights import least_squares
 from nlsolve_discretizers.weights.least_squares import SOUND, fit
-from nlsolve_discretizers.weights.lists import Lists, largest_near
+from nlsolve_discretizers.weights.lists import Lists
 from nlsolve_discretizers.weights.supports import Supports
 from nlsolve_discretizers.weights.triangles import Triangles
 
@@ -151,21 +151,6 @@ def test_lists_with_some_to_spare_need_no_tree_until_the_motion_has_used_it_up(a
     assert asked == [81]
     lists.moved(lists.sources + 0.1, lists.targets + 0.1)
     assert asked == [81, 81]
-
-
-@pytest.mark.parametrize("within", [0.0, 0.05, 0.3, 2.0])
-def test_the_largest_value_near_a_target_is_that_of_a_place_near_it(within: float) -> None:
-    random = np.random.default_rng(3)
-    places, values = random.random((300, 2)) * [1.0, 0.2], random.random(300)
-    targets = random.random((90, 2)) * [1.2, 0.4] - 0.1
-    bound = largest_near(places, values, targets, within)
-    distance = np.linalg.norm(targets[:, None] - places, axis=2)
-    near = np.where(distance <= within, values, 0.0).max(axis=1)
-    side = max(within, 1.2 / 300**0.5)
-    not_far = np.where(distance < 8.0**0.5 * side * (1.0 + 1e-9), values, 0.0).max(axis=1)
-    assert (near <= bound).all()
-    assert (bound <= not_far).all()
-    assert largest_near(np.ones((1, 2)), np.ones(1), np.ones((1, 2)), 0.0) == 1.0
 
 
 def test_what_moves_fast_elsewhere_takes_no_list_its_spare_sources(asked: list[int]) -> None:
