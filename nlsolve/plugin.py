@@ -8,8 +8,8 @@ from nlsolve.contracts.continuum.adaptive import AdaptiveNodes, Spacing
 from nlsolve.contracts.continuum.cloud import Cloud, Exact, hat_gradients
 from nlsolve.contracts.continuum.discretizer import Discretizer, Operators, PointOperators
 from nlsolve.contracts.continuum.law import ConstitutiveLaw, PowerForm, local_index, stress, tangent_moduli
-from nlsolve.contracts.continuum.terms import NodeMotion, Physics, Recording, TimeSteps
 from nlsolve.contracts.continuum.near import largest_near
+from nlsolve.contracts.continuum.terms import NodeMotion, Physics, Recording, TimeSteps
 from nlsolve.contracts.continuum.triangulation import doubled_areas, on_one_wall, side_keys
 from nlsolve.contracts.continuum.walls import middles as wall_middles
 from nlsolve.contracts.continuum.walls import wall_edges

@@ -107,10 +107,11 @@ class Flow(NonlinearProblem):
         if body_force is not None:
             constant -= areas * body_force.ravel()
         self._constant = constant
+        self._known: tuple[Array, tuple[Array, Array | None]] | None = None
 
     def residual(self, u: Array) -> Array:
         """R(u), (2F,)."""
-        return self._balance(u)
+        return self._balance(u, self._stresses_at(u))
 
     def expand(self, u: Array) -> Expansion:
         """The expansion of R around u: the formula of the residual, run on a series that begins with u.
@@ -118,13 +119,27 @@ class Flow(NonlinearProblem):
         Its coefficients raise SolveError (non-finite) where the law has no series at a strain rate of u.
         """
         path = Series(u)
-        return _Expansion(path, self._balance(path), self)
+        return _Expansion(path, self._balance(path, self._stresses(path)), self)
 
-    def _balance(self, u: Number) -> Number:
+    def _stresses_at(self, u: Array) -> tuple[Array, Array | None]:
+        """`_stresses` of a state, kept: a solve asks for `scale` and `residual` where it starts."""
+        if self._known is None or not np.array_equal(self._known[0], u):
+            self._known = u.copy(), self._stresses(u)
+        return self._known[1]
+
+    def _stresses(self, u: Number) -> tuple[Number, Number | None]:
+        """s at the strain points, (3M,), and λ B_θ v at the volume points, (L,), None without a volumetric term."""
         placed = self._inside @ u
-        balance = self._constant - self._force @ stress(self.law, self._strain_rate(placed)).reshape(-1)
+        deviatoric = stress(self.law, self._strain_rate(placed)).reshape(-1)
+        if self._volumetric is None:
+            return deviatoric, None
+        return deviatoric, self._modulus * (self._volumetric.rate @ placed)
+
+    def _balance(self, u: Number, stresses: tuple[Number, Number | None]) -> Number:
+        deviatoric, volumetric = stresses
+        balance = self._constant - self._force @ deviatoric
         if self._volumetric is not None:
-            balance = balance - self._volumetric.force @ (self._modulus * (self._volumetric.rate @ placed))
+            balance = balance - self._volumetric.force @ volumetric
         if self._inertia is not None:
             balance = balance + self._inertia * u
         if self._carried is not None:
@@ -229,11 +244,11 @@ class Flow(NonlinearProblem):
 
     def scale(self, u: Array) -> float:
         """‖|S| |s| + |S_θ| |λ B_θ v| + W ρ |v/Δt + v·∇ v| + |constant|‖₂: the size of the forces that cancel in R."""
-        placed = self._inside @ u
-        terms = _magnitude(self._force) @ np.abs(stress(self.law, self._strain_rate(placed))).ravel()
+        deviatoric, volumetric = self._stresses_at(u)
+        terms = _magnitude(self._force) @ np.abs(deviatoric)
         terms += np.abs(self._constant)
-        if self._volumetric is not None:
-            terms += _magnitude(self._volumetric.force) @ np.abs(self._modulus * (self._volumetric.rate @ placed))
+        if self._volumetric is not None and volumetric is not None:
+            terms += _magnitude(self._volumetric.force) @ np.abs(volumetric)
         if self._inertia is not None:
             terms += self._inertia * np.abs(u)
         if self._carried is not None:

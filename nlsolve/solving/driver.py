@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from functools import partial
+from operator import lt
 from typing import Any
 
 import numpy as np
@@ -79,8 +80,7 @@ def solve(
             idle,
         )
 
-    def is_solved(state: Array) -> bool:
-        residual = counted.uncounted_residual(state)
+    def is_solved(state: Array, residual: Array) -> bool:
         if stop.kind == "absolute":
             return stop.size(residual) <= stop.tolerance
         return measure.settled(state, residual, float(residual_norm), stop.verified)
@@ -95,7 +95,7 @@ def solve(
             "leave `operator` at its default, or choose a method that keeps any K*, such as modified-newton",
         )
     iterator = iter(solver.steps(counted, tangent, start))
-    first, best = np.inf, np.full(3, np.inf)
+    first, best = np.inf, [np.inf] * 3
     since_best = 0
     for number in range(budget.iterations + 1):
         worked = ledger.counts.total() - ledger.counts["method"]
@@ -107,7 +107,7 @@ def solve(
             residual = counted.uncounted_residual(before)
             if not stop.is_of_residuals and (size == 0.0 or (lost and measure.vanishes(before, residual))):
                 return ended(Status.CONVERGED, "R = 0, and the method has no further step to compare or to claim")
-            denied |= bool(rows) and is_solved(before)
+            denied |= bool(rows) and is_solved(before, residual)
             return ended(error.status, error.detail)
         except np.linalg.LinAlgError as error:  # of the dense algebra that a method has of its own
             return ended(Status.NON_FINITE, f"the method's own linear algebra failed on its numbers: {error}")
@@ -140,16 +140,16 @@ def solve(
         }
         contraction_column = {"contraction": np.nan if contraction is None else contraction}
         rows.append(measured | contraction_column | step_columns(step.notes) | measured)
-        solved = step.claim is not None and is_solved(step.state)
+        solved = step.claim is not None and is_solved(before, residual)
         claimed |= step.claim is True and not solved
         denied |= step.claim is False and solved
         if not np.isfinite(residual_norm):
             if not np.isfinite(step.state).all():
                 return ended(Status.NON_FINITE)
             return ended(Status.OUT_OF_DOMAIN, problem.undefined(step.state))
-        if stop.met(step, partial(is_solved, step.state), difference):
+        if stop.met(step, partial(is_solved, before, residual), difference):
             if not stop.is_of_residuals:  # accepts a state without its residual
-                claimed |= not is_solved(step.state)
+                claimed |= not is_solved(before, residual)
             if stop.kind == "absolute":
                 measure.settled(step.state, residual, residual_norm, np.inf)  # for the correction that is reported
             return ended(Status.CONVERGED)
@@ -157,9 +157,9 @@ def solve(
             first = progress
         if progress > GROWTH_OF_DIVERGENCE * max(1.0, first):
             return ended(Status.DIVERGED)
-        now = np.array([progress, norm(measure.weighted(residual)), residual_norm])
-        since_best = 0 if (now < best).any() else since_best + 1
-        best = np.fmin(best, now)
+        now = progress, norm(measure.weighted(residual)), residual_norm
+        since_best = 0 if any(map(lt, now, best)) else since_best + 1
+        best = list(map(min, best, now))
         if since_best >= PATIENCE:
             return ended(Status.STAGNATED)
     return ended(Status.BUDGET_SPENT)

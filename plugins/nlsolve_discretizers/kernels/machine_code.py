@@ -25,8 +25,8 @@ def each(begin: int, end: int) -> Any:
 def compiled(function: Callable[..., Any], arguments: str, *called: Callable[..., Any]) -> Callable[..., Any] | None:
     """`function` as machine code; None where there is no compiler.
 
-    arguments : the kind (f, i, b, and n: whole numbers of half the size) and the number of indices of each, and c for
-        an array whose numbers lie in order, e.g. "f2 i0 n2c"; arrays are only read.
+    arguments : the kind (f, i, b, and u: whole numbers ≥ 0 of half the size) and the number of indices of each, and c
+        for an array whose numbers lie in order, e.g. "f2 i0 u2c"; arrays are only read.
     called : the functions that it calls, of its own file: when that changes all is compiled again.
     """
     return _code(function, arguments, called) if _allowed and compiler() is not None else None
@@ -69,7 +69,7 @@ def compiler() -> Any:
 @cache
 def _code(function: Callable[..., Any], arguments: str, called: tuple[Callable[..., Any], ...]) -> Callable[..., Any]:
     numba = compiler()
-    kinds = {"f": numba.float64, "i": numba.int64, "n": numba.int32, "b": numba.boolean}
+    kinds = {"f": numba.float64, "i": numba.int64, "u": numba.uint32, "b": numba.boolean}
 
     def declared(argument: str) -> Any:
         kind, indices = kinds[argument[0]], int(argument[1])

@@ -1,7 +1,8 @@
 """ε̇(v), div v, div s, ∇p : derivatives of a vector field by the weights of ∂/∂x and ∂/∂y, as machine code.
 
 Every weight is read once, where a sparse matrix has it once for each row. T targets, k neighbours each, `near` (T, k),
-weights `both` (2, T, k) [1/mm]; velocities are node-major, strain rates and stresses in blocks xx, yy, xy.
+weights `both` (2, T, k) [1/mm], or their magnitudes; velocities are node-major, strain rates and stresses in blocks xx,
+yy, xy.
 """
 
 from __future__ import annotations
@@ -14,60 +15,70 @@ import numpy as np
 from nlsolve_discretizers.kernels.machine_code import compiled
 
 
-def strain_rate(near: np.ndarray, both: np.ndarray, velocity: np.ndarray) -> np.ndarray:
+def weights(both: np.ndarray, t: int, n: int, magnitudes: bool) -> tuple[float, float]:
+    """Those of ∂/∂x and ∂/∂y at neighbour n of target t."""
+    dx, dy = both[0, t, n], both[1, t, n]
+    return (abs(dx), abs(dy)) if magnitudes else (dx, dy)
+
+
+def strain_rate(near: np.ndarray, both: np.ndarray, magnitudes: bool, velocity: np.ndarray) -> np.ndarray:
     """xx, yy, xy of ½(∇v + ᵗ∇v), (3 T,)."""
     targets, k = near.shape
     rates = np.empty(3 * targets)
     for t in range(targets):
         xx = yy = uy = vx = 0.0
         for n in range(k):
+            dx, dy = weights(both, t, n, magnitudes)
             u, v = velocity[2 * near[t, n]], velocity[2 * near[t, n] + 1]
-            xx += both[0, t, n] * u
-            yy += both[1, t, n] * v
-            uy += both[1, t, n] * u
-            vx += both[0, t, n] * v
+            xx += dx * u
+            yy += dy * v
+            uy += dy * u
+            vx += dx * v
         rates[t], rates[targets + t], rates[2 * targets + t] = xx, yy, 0.5 * uy + 0.5 * vx
     return rates
 
 
-def divergence(near: np.ndarray, both: np.ndarray, velocity: np.ndarray) -> np.ndarray:
+def divergence(near: np.ndarray, both: np.ndarray, magnitudes: bool, velocity: np.ndarray) -> np.ndarray:
     """div v, (T,)."""
     targets, k = near.shape
     rates = np.empty(targets)
     for t in range(targets):
         xx = yy = 0.0
         for n in range(k):
-            xx += both[0, t, n] * velocity[2 * near[t, n]]
-            yy += both[1, t, n] * velocity[2 * near[t, n] + 1]
+            dx, dy = weights(both, t, n, magnitudes)
+            xx += dx * velocity[2 * near[t, n]]
+            yy += dy * velocity[2 * near[t, n] + 1]
         rates[t] = xx + yy
     return rates
 
 
-def divergence_of_stress(near: np.ndarray, both: np.ndarray, stress: np.ndarray) -> np.ndarray:
+def divergence_of_stress(near: np.ndarray, both: np.ndarray, magnitudes: bool, stress: np.ndarray) -> np.ndarray:
     """∂xx/∂x + ∂xy/∂y and ∂xy/∂x + ∂yy/∂y, node-major, (2 T,)."""
     (targets, k), points = near.shape, len(stress) // 3
     force = np.empty(2 * targets)
     for t in range(targets):
         xx = yy = shear_x = shear_y = 0.0
         for n in range(k):
+            dx, dy = weights(both, t, n, magnitudes)
             shear = stress[2 * points + near[t, n]]
-            xx += both[0, t, n] * stress[near[t, n]]
-            yy += both[1, t, n] * stress[points + near[t, n]]
-            shear_x += both[0, t, n] * shear
-            shear_y += both[1, t, n] * shear
+            xx += dx * stress[near[t, n]]
+            yy += dy * stress[points + near[t, n]]
+            shear_x += dx * shear
+            shear_y += dy * shear
         force[2 * t], force[2 * t + 1] = xx + shear_y, shear_x + yy
     return force
 
 
-def gradient(near: np.ndarray, both: np.ndarray, pressure: np.ndarray) -> np.ndarray:
+def gradient(near: np.ndarray, both: np.ndarray, magnitudes: bool, pressure: np.ndarray) -> np.ndarray:
     """∂p/∂x and ∂p/∂y, node-major, (2 T,)."""
     targets, k = near.shape
     force = np.empty(2 * targets)
     for t in range(targets):
         x = y = 0.0
         for n in range(k):
-            x += both[0, t, n] * pressure[near[t, n]]
-            y += both[1, t, n] * pressure[near[t, n]]
+            dx, dy = weights(both, t, n, magnitudes)
+            x += dx * pressure[near[t, n]]
+            y += dy * pressure[near[t, n]]
         force[2 * t], force[2 * t + 1] = x, y
     return force
 
@@ -75,17 +86,17 @@ def gradient(near: np.ndarray, both: np.ndarray, pressure: np.ndarray) -> np.nda
 STRAIN_RATE, DIVERGENCE, DIVERGENCE_OF_STRESS, GRADIENT = range(4)
 
 
-def product(which: int, near: np.ndarray, both: np.ndarray, vector: np.ndarray) -> np.ndarray:
+def product(which: int, near: np.ndarray, both: np.ndarray, magnitudes: bool, vector: np.ndarray) -> np.ndarray:
     """One of the four."""
     if which == STRAIN_RATE:
-        return strain_rate(near, both, vector)
+        return strain_rate(near, both, magnitudes, vector)
     if which == DIVERGENCE:
-        return divergence(near, both, vector)
+        return divergence(near, both, magnitudes, vector)
     if which == DIVERGENCE_OF_STRESS:
-        return divergence_of_stress(near, both, vector)
-    return gradient(near, both, vector)
+        return divergence_of_stress(near, both, magnitudes, vector)
+    return gradient(near, both, magnitudes, vector)
 
 
 def machine_code() -> Callable[..., Any] | None:
     """`product`, compiled; None where there is no compiler."""
-    return compiled(product, "i0 n2c f3c f1c", strain_rate, divergence, divergence_of_stress, gradient)
+    return compiled(product, "i0 u2c f3c b0 f1c", weights, strain_rate, divergence, divergence_of_stress, gradient)

@@ -36,7 +36,7 @@ class Gradient:
     @cached_property
     def numbers(self) -> np.ndarray:
         """The neighbours, in half the memory."""
-        return np.ascontiguousarray(self.near, dtype=np.int32)
+        return np.ascontiguousarray(self.near, dtype=np.uint32)
 
     def at(self, targets: np.ndarray) -> Gradient:
         """The same at some of the targets."""
@@ -82,6 +82,7 @@ class Unassembled:
     weights : the derivatives that its entries are made of.
     which : the product A @ x among those of `kernels.products`.
     rows, stride, of_target_together : the same in terms of `sparse_rows`.
+    magnitudes : whether A is that of the magnitudes of its entries.
     """
 
     shape: tuple[int, int]
@@ -90,6 +91,7 @@ class Unassembled:
     rows: tuple[Row, ...]
     stride: int
     of_target_together: bool
+    magnitudes: bool = False
     dtype = np.dtype(float)
     __array_ufunc__ = None  # so that NumPy's arrays leave x @ A to this class
 
@@ -99,7 +101,8 @@ class Unassembled:
 
     @cached_property
     def _matrix(self) -> Any:
-        near, both = self.weights.near.astype(np.intp, copy=False), self.weights.both
+        near, both = self.weights.near, self.weights.both
+        both = np.abs(both) if self.magnitudes else both
         return sparse_rows(near, both, self.rows, self.stride, self.shape[1], self.of_target_together)
 
     @cached_property
@@ -108,7 +111,7 @@ class Unassembled:
         code = products.machine_code()
         if code is None:
             return None
-        return partial(code, self.which, self.weights.numbers, np.ascontiguousarray(self.weights.both))
+        return partial(code, self.which, self.weights.numbers, np.ascontiguousarray(self.weights.both), self.magnitudes)
 
     def __matmul__(self, other: Any) -> Any:
         if self._times is not None and isinstance(other, np.ndarray) and other.shape == self.shape[1:]:
@@ -117,8 +120,7 @@ class Unassembled:
         return self._matrix @ entries if isinstance(entries, np.ndarray) or sp.issparse(entries) else NotImplemented
 
     def __abs__(self) -> Unassembled:
-        weights = Gradient(self.weights.numbers, np.abs(self.weights.both))
-        return replace(self, weights=weights)  # all factors are positive, and each weight has an entry of its own
+        return replace(self, magnitudes=True)  # all factors are positive, and each weight has an entry of its own
 
     def __getattr__(self, name: str) -> Any:
         if name.startswith("_"):

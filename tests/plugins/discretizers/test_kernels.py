@@ -236,7 +236,7 @@ def test_where_nothing_can_be_kept_it_is_compiled_in_every_process(monkeypatch: 
             raise RuntimeError("cannot cache function: no locator available")
         return lambda function: function
 
-    numba = SimpleNamespace(njit=njit, int32="i4", float64="f8", int64="i8", boolean="b1")
+    numba = SimpleNamespace(njit=njit, uint32="i4", float64="f8", int64="i8", boolean="b1")
     monkeypatch.setattr(machine_code, "compiler", lambda: numba)
     assert compiled(ranking.by_insertion, "f0 i0") is ranking.by_insertion
     assert asked == [True, False]
