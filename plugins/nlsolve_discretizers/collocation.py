@@ -66,7 +66,7 @@ class Collocation(Discretizer):
         """Neighbours of the targets (T, 2) among the sources (S, 2) [mm], for the weights in a role: "strain", "force"
         or "volume" on a cloud, "value" at any points.
 
-        lists : of one source more than `neighbour_count`, where there are such.
+        lists : of `neighbour_count` sources, where there are such.
         """
 
     @abstractmethod
@@ -126,7 +126,7 @@ class Collocation(Discretizer):
         if role in near.supports:
             return near.supports[role].moved(sources, targets)
         count = self.neighbour_count(role)
-        lists = None if count is None else near.listed(role, sources, targets, count + 1)
+        lists = None if count is None else near.listed(role, sources, targets, count)
         return self.supports(sources, targets, role, cloud, lists)
 
     def operators(self, cloud: Cloud, volumetric: bool) -> Operators:

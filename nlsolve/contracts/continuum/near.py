@@ -40,8 +40,8 @@ class Near:
     def moved_to(self, nodes: Array, tree: Callable[[], scipy.spatial.cKDTree]) -> Near:
         """The same for the nodes at other places (N, 2); their tree is asked about those whose list may be too short.
 
-        |x_i − x_j| ≥ r_i − |δx_i| − max_j |δx_j| for all j that are not listed, the maximum over those j that are near enough
-        to come so near.
+        |x_i − x_j| ≥ r_i − |δx_i| − max_j |δx_j| for all j that are not listed; the maximum is over those that are near
+        enough to come so near.
         """
         x, y = np.ascontiguousarray(nodes.T)
         dx, dy = x - self.nodes[:, 0], y - self.nodes[:, 1]

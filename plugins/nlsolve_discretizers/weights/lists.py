@@ -7,6 +7,7 @@ near enough to come so near: what moves fast elsewhere does not matter.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -28,18 +29,19 @@ class Lists:
     """The nearest sources of T targets.
 
     sources, targets : their places (S, 2) and (T, 2) [mm].
-    index, distance : (T, K), nearest first; −1 for a source that is no more, at an infinite distance.
+    index : (T, K), the `count` nearest first, by number, then some to spare; −1 for a source that is no more.
+    farthest, beyond : (T,) [mm], distances of the last of the nearest, and of the next source, infinite for none.
     reach : (T,) [mm], every source nearer than this is listed.
-    count : how many of the nearest are sure to be listed, all sources at most.
     known_tree : the tree of the sources, where there is one already.
     """
 
     sources: np.ndarray
     targets: np.ndarray
-    index: np.ndarray
-    distance: np.ndarray
-    reach: np.ndarray
     count: int
+    index: np.ndarray
+    farthest: np.ndarray
+    beyond: np.ndarray
+    reach: np.ndarray
     known_tree: scipy.spatial.cKDTree | None = None
 
     @classmethod
@@ -48,13 +50,13 @@ class Lists:
         sources: np.ndarray,
         targets: np.ndarray,
         count: int,
-        spare: int = 0,
+        spare: int = 1,
         tree: scipy.spatial.cKDTree | None = None,
     ) -> Lists:
-        """The `count` nearest sources, and some to spare."""
+        """The `count` nearest sources, of more, and `spare` others, one at least."""
         every, listed = np.arange(len(targets)), min(count + spare, len(sources))
-        index, distance = np.empty((len(targets), listed), np.intp), np.empty((len(targets), listed))
-        lists = cls(sources, targets, index, distance, np.empty(len(targets)), min(count, len(sources)), tree)
+        index, (farthest, beyond, reach) = np.empty((len(targets), listed), np.intp), np.empty((3, len(targets)))
+        lists = cls(sources, targets, count, index, farthest, beyond, reach, tree)
         return lists._filled(every, lists.query(listed, every))
 
     def moved(
@@ -74,7 +76,7 @@ class Lists:
             steps = _steps(self.sources, sources, None)
         else:
             old = np.flatnonzero(sources_before >= 0)
-            steps[sources_before[old]] = np.linalg.norm(sources[old] - self.sources[sources_before[old]], axis=1)
+            steps[sources_before[old]] = _steps(self.sources[sources_before[old]], sources[old], None)
         within = np.max(self.reach, where=np.isfinite(self.reach), initial=0.0) + steps.max(initial=0.0)
         reach = self.reach - largest_near(self.sources, steps, self.targets, float(within))
         if targets_before is not None:
@@ -83,31 +85,35 @@ class Lists:
         if sources_before is not None:
             new = sources[sources_before < 0]
             if len(new):
-                reach = np.minimum(reach, scipy.spatial.cKDTree(new).query(targets)[0])
+                farthest = float(reach.max(initial=0.0))
+                reach = np.minimum(reach, scipy.spatial.cKDTree(new).query(targets, distance_upper_bound=farthest)[0])
         rows, numbers = _as_they_are(len(targets), len(self.sources))
         if targets_before is not None:
             rows = targets_before
         if sources_before is not None:
             numbers = _numbers_now(sources_before, len(self.sources))
-        index, distance = ranked(sources, targets, self.index, rows, numbers)
-        now = Lists(sources, targets, index, distance, reach, self.count, tree)
-        which = np.flatnonzero(~(distance[:, self.count - 1] < reach))
+        index, (farthest, beyond) = ranked(sources, targets, self.index, rows, numbers, self.count)
+        now = Lists(sources, targets, self.count, index, farthest, beyond, reach, tree)
+        which = np.flatnonzero(~(beyond < reach))
         return now._filled(which, now.query(index.shape[1], which, quick=True)) if len(which) else now
 
     def _filled(self, which: np.ndarray, found: tuple[np.ndarray, np.ndarray]) -> Lists:
         """These lists, still in nobody's hands, with those `found` for the targets `which` written into them."""
-        self.distance[which], self.index[which] = found
-        self.reach[which] = self.distance[which, -1] if self.index.shape[1] < len(self.sources) else np.inf
+        distance, index = found
+        index[:, : self.count].sort(axis=1)
+        self.index[which] = index
+        self.farthest[which], self.beyond[which] = distance[:, self.count - 1], distance[:, self.count]
+        self.reach[which] = distance[:, -1] if index.shape[1] < len(self.sources) else np.inf
         return self
 
-    def nearest(self) -> tuple[np.ndarray, np.ndarray]:
-        """Distances and numbers of the `count` nearest sources of all targets, (T, count) each."""
-        distance, index = self.distance[:, : self.count], self.index[:, : self.count]
-        tied = np.flatnonzero(distance[:, -2:-1].sum(axis=1) >= (1.0 - TIE) * distance[:, -1])
+    def nearest(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Numbers (T, count) of the nearest sources, in order, the distance of the last and that of the next one."""
+        index = self.index[:, : self.count]
+        tied = np.flatnonzero(self.farthest >= (1.0 - TIE) * self.beyond)
         if len(tied):
-            distance, index = distance.copy(), index.copy()
-            distance[tied], index[tied] = self.query(self.count, tied)
-        return distance, index
+            index = index.copy()
+            index[tied] = np.sort(self.query(self.count + 1, tied)[1][:, : self.count], axis=1)
+        return index, self.farthest, self.beyond
 
     def query(self, count: int, which: np.ndarray, quick: bool = False) -> tuple[np.ndarray, np.ndarray]:
         """Distances and numbers of the `count` nearest sources of the targets `which`, (W, count) each, by the tree.
@@ -118,8 +124,7 @@ class Lists:
             tree = scipy.spatial.cKDTree(self.sources, compact_nodes=False, balanced_tree=False)
         else:
             tree = self.tree
-        distance, index = tree.query(self.targets[which], np.arange(1, count + 1))
-        return distance, index
+        return by_tree(tree, self.targets)(count, which)
 
     @cached_property
     def tree(self) -> scipy.spatial.cKDTree:
@@ -127,11 +132,20 @@ class Lists:
         return scipy.spatial.cKDTree(self.sources) if self.known_tree is None else self.known_tree
 
 
+def by_tree(
+    tree: scipy.spatial.cKDTree, targets: np.ndarray
+) -> Callable[[int, np.ndarray], tuple[np.ndarray, np.ndarray]]:
+    """count, which -> distances and numbers of the `count` nearest sources of the targets `which`, (W, count) each."""
+    return lambda count, which: tree.query(targets[which], np.arange(1, count + 1))
+
+
 def _steps(before: np.ndarray, now: np.ndarray, numbers: np.ndarray | None) -> np.ndarray:
     """|δx| of the places `now` (P, 2), 0 for new ones."""
-    if numbers is None:
-        return np.linalg.norm(now - before, axis=1)
-    return np.where(numbers < 0, 0.0, np.linalg.norm(now - before[numbers], axis=1))
+    if numbers is not None:
+        return np.where(numbers < 0, 0.0, _steps(before[numbers], now, None))
+    dx, dy = now.T - before.T
+    steps: np.ndarray = np.sqrt(dx * dx + dy * dy)
+    return steps
 
 
 def _as_they_are(targets: int, sources: int) -> tuple[np.ndarray, np.ndarray]:

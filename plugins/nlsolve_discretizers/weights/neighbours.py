@@ -44,8 +44,10 @@ class Neighbours:
         return Neighbours(triangles, before=self.lists, points_before=numbers)
 
     def listed(self, role: str, sources: np.ndarray, targets: np.ndarray, count: int) -> Lists | None:
-        """Lists of the `count` nearest sources in a role; None on a cloud whose nodes have not moved."""
-        if self.before is None:
+        """Lists of the `count` nearest sources in a role; None on a cloud whose nodes have not moved, and
+        where there are no more sources.
+        """
+        if self.before is None or len(sources) <= count:
             return None
         earlier, cloud = self.before.get(role), self.triangles.cloud
         tree = cloud.tree if sources is cloud.nodes else None

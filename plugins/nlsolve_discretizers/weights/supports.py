@@ -13,7 +13,7 @@ import scipy
 from nlsolve.plugin import SolveError, Status
 from nlsolve_discretizers.kernels.offsets import offsets
 from nlsolve_discretizers.kernels.quadrants import quadrants, surrounded
-from nlsolve_discretizers.weights.lists import Lists
+from nlsolve_discretizers.weights.lists import Lists, by_tree
 
 REACH = 1.5  # times the distance of the farthest neighbour: a quadrant whose nearest source lies beyond is left empty
 
@@ -45,7 +45,7 @@ class Supports:
         """The `count` nearest sources, one number or (T,). `balanced` supports grow, to twice `count` at most, until
         every quadrant around the target that has a source within REACH holds a neighbour.
 
-        lists : of one source more than `count`, where there are such.
+        lists : of `count` sources, where there are such.
         Raises SolveError (bad cloud) if there are too few sources.
         """
         counts = np.broadcast_to(count, len(targets))
@@ -54,32 +54,34 @@ class Supports:
             raise SolveError(
                 Status.BAD_CLOUD, f"a support of {largest} neighbours was asked for among {len(sources)} points"
             )
-        lists = Lists.of(sources, targets, largest + 1) if lists is None else lists
-        distance, index = lists.nearest()
-        plain = cls._of(distance, index, counts)
+        if lists is None:
+            query = by_tree(scipy.spatial.cKDTree(sources), targets)
+            plain = cls._of(*query(largest + 1, np.arange(len(targets))), counts)
+        else:
+            query, plain = lists.query, cls._reaching(*lists.nearest(), counts)
         if not balanced:
             return plain
-        lopsided = np.flatnonzero(~surrounded(sources, targets, index[:, :largest], counts))
+        lopsided = np.flatnonzero(~surrounded(sources, targets, plain.index, counts))
         if not len(lopsided):
             return plain
         most = min(2 * largest, len(sources) - 1)
-        distance, index = lists.query(most + 1, lopsided)
+        distance, index = query(most + 1, lopsided)
         apart = offsets(sources, targets[lopsided], index[:, :most])
         return plain.replaced(lopsided, cls._of(distance, index, _balanced(apart, distance, counts[lopsided])))
 
     @classmethod
     def _of(cls, distance: np.ndarray, index: np.ndarray, counts: np.ndarray) -> Supports:
         """Supports from the sources that a tree found for each target: `counts` neighbours and at least one more."""
-        row = np.arange(len(counts))
-        farthest, next_one = distance[row, counts - 1], distance[row, counts]
-        # On a regular grid the two tie, and a source on the rim would weigh nothing: the rim lies just beyond it.
-        radius = np.maximum(0.5 * (farthest + next_one), 1.001 * farthest)
-        width = int(counts.max(initial=1))
-        index = index[:, :width]
-        if (counts == width).all():
-            return cls(np.sort(index, axis=1), counts, radius, farthest)
+        row, width = np.arange(len(counts)), int(counts.max(initial=1))
         beyond = (np.arange(width) >= counts[:, None]) * (int(index.max(initial=0)) + 1)
-        return cls(np.sort(index + beyond, axis=1) - beyond, counts, radius, farthest)
+        in_order = np.sort(index[:, :width] + beyond, axis=1) - beyond
+        return cls._reaching(in_order, distance[row, counts - 1], distance[row, counts], counts)
+
+    @classmethod
+    def _reaching(cls, index: np.ndarray, farthest: np.ndarray, beyond: np.ndarray, counts: np.ndarray) -> Supports:
+        """Supports from the distances of the last neighbour and of the next source."""
+        # On a regular grid the two tie, and a source on the rim would weigh nothing: the rim lies just beyond it.
+        return cls(index, counts, np.maximum(0.5 * (farthest + beyond), 1.001 * farthest), farthest)
 
     @classmethod
     def within(cls, sources: np.ndarray, targets: np.ndarray, radius: float) -> Supports:

@@ -143,17 +143,23 @@ def test_compiled_weights_tell_supports_that_determine_nothing() -> None:
 
 
 @needs_numba
-def test_compiled_ranks_are_numpys() -> None:
+@pytest.mark.parametrize("renumbered", [False, True])
+def test_compiled_ranks_are_numpys(renumbered: bool) -> None:
+    """For targets whose nearest sources come first already, and for others; some sources are lost."""
     random = np.random.default_rng(2)
-    sources, targets = random.random((50, 2)), random.random((40, 2))
+    sources, targets, rows = random.random((50, 2)), random.random((40, 2)), random.permutation(40)
     index = np.argsort(random.random((40, 50)), axis=1)[:, :21]
     index[random.random(index.shape) < 0.2] = -1
-    given = sources, targets, index, random.permutation(40), np.append(random.permutation(50), -1)
-    ranks = ranking.ranked(*given)
+    index[rows[:20]] = np.argsort(np.linalg.norm(targets[:20, None] - sources, axis=2), axis=1)[:, :21]
+    index[:, :9].sort(axis=1)
+    numbers = np.append(random.permutation(50) if renumbered else np.arange(50), -1)
+    given = sources, targets, index, rows, numbers, 9
+    ranks, distances = ranking.ranked(*given)
     with numpy_alone():
-        others = ranking.ranked(*given)
-    for one, other in zip(ranks, others, strict=True):
-        np.testing.assert_array_equal(one, other)
+        others, same = ranking.ranked(*given)
+    np.testing.assert_array_equal(ranks[:, :9], others[:, :9])
+    np.testing.assert_array_equal(np.sort(ranks[:, 9:]), np.sort(others[:, 9:]))
+    np.testing.assert_array_equal(distances, same)
 
 
 @needs_numba
@@ -238,7 +244,7 @@ def test_where_nothing_can_be_kept_it_is_compiled_in_every_process(monkeypatch: 
 
     numba = SimpleNamespace(njit=njit, uint32="i4", float64="f8", int64="i8", boolean="b1")
     monkeypatch.setattr(machine_code, "compiler", lambda: numba)
-    assert compiled(ranking.by_insertion, "f0 i0") is ranking.by_insertion
+    assert compiled(ranking.one_by_one, "f0 i0") is ranking.one_by_one
     assert asked == [True, False]
 
 

@@ -123,10 +123,11 @@ def test_lists_hold_the_nearest_of_moving_appearing_and_vanishing_sources() -> N
         new_targets[150 - len(aims) :] = targets[aims] + random.normal(0.0, 0.004, (len(aims), 2))
         sources, targets = new_sources, new_targets
         lists = lists.moved(sources, targets, numbers, aim_numbers)
-        distance, index = lists.nearest()
+        index, farthest, beyond = lists.nearest()
         anew = Lists.of(sources, targets, 9)
-        np.testing.assert_array_equal(index, anew.index)
-        np.testing.assert_array_equal(distance, anew.distance)
+        np.testing.assert_array_equal(index, anew.index[:, :9])
+        np.testing.assert_array_equal(farthest, anew.farthest)
+        np.testing.assert_array_equal(beyond, anew.beyond)
 
 
 @pytest.fixture
@@ -169,7 +170,7 @@ def test_lists_of_all_sources_never_end(asked: list[int]) -> None:
     lists = Lists.of(x, x, 5, 8)
     assert np.isinf(lists.reach).all()
     moved = lists.moved(x[::-1], x)
-    np.testing.assert_array_equal(moved.nearest()[1], Lists.of(x[::-1], x, 5).index)
+    np.testing.assert_array_equal(moved.nearest()[0], Lists.of(x[::-1], x, 5).index[:, :5])
     assert asked == [9, 9]
 
 
