@@ -10,7 +10,7 @@ from nlsolve.contracts.continuum.discretizer import Discretizer, Operators, Poin
 from nlsolve.contracts.continuum.law import ConstitutiveLaw, PowerForm, local_index, stress, tangent_moduli
 from nlsolve.contracts.continuum.near import largest_near
 from nlsolve.contracts.continuum.terms import NodeMotion, Physics, Recording, TimeSteps
-from nlsolve.contracts.continuum.triangulation import doubled_areas, on_one_wall, side_keys
+from nlsolve.contracts.continuum.triangulation import doubled_areas, in_order, on_one_wall, side_keys
 from nlsolve.contracts.continuum.walls import middles as wall_middles
 from nlsolve.contracts.continuum.walls import wall_edges
 from nlsolve.contracts.linear_solver import Factors, LinearSolver
@@ -92,6 +92,7 @@ __all__ = [
     "doubled_areas",
     "hat_gradients",
     "hookimpl",
+    "in_order",
     "largest_near",
     "least_squares",
     "local_index",

@@ -81,6 +81,19 @@ def side_keys(corners: Indices, nodes: int) -> Indices:
     return np.minimum(start, end) * nodes + np.maximum(start, end)
 
 
+def in_order(keys: Indices) -> tuple[Indices, Indices]:
+    """The places (K,) of whole numbers ≥ 0 in their order, equal ones as they were, and the numbers in it.
+
+    To sort numbers that hold their places in their last bits takes a fifth of the time that `argsort` takes.
+    """
+    bits = len(keys).bit_length()
+    if int(keys.max(initial=0)).bit_length() + bits > 63:
+        order = np.argsort(keys, kind="stable")
+        return order, keys[order]
+    both = np.sort(keys << bits | np.arange(len(keys)))
+    return both & ((1 << bits) - 1), both >> bits
+
+
 def kept(corners: Indices, nodes: Array, walls: Indices) -> Indices | None:
     """The triangles that `found` would give, by flips in those of before (T, 3); None where these do not lead there.
 
@@ -123,8 +136,8 @@ def quadrilaterals(corners: Indices) -> tuple[Indices, Indices, Indices]:
     """
     start, end = corners.ravel(), corners[:, [1, 2, 0]].ravel()
     key = side_keys(corners, int(corners.max()) + 1)
-    order = np.argsort(key, kind="stable")
-    again = np.flatnonzero(key[order[1:]] == key[order[:-1]])
+    order, key = in_order(key)
+    again = np.flatnonzero(key[1:] == key[:-1])
     one, other = order[again], order[again + 1]
     single = np.ones(len(key), dtype=bool)
     single[one] = single[other] = False

@@ -23,6 +23,7 @@ from nlsolve.plugin import (
     Status,
     doubled_areas,
     hat_gradients,
+    in_order,
     on_one_wall,
     side_keys,
 )
@@ -80,9 +81,7 @@ class Triangles:
         """Edges (E, 2), each once, smaller node first, and for each the triangles beside it (E, 2), −1 for none."""
         if self.found is not None:
             return self.found.edges
-        key = side_keys(self.corners, len(self.cloud.nodes))
-        order = np.argsort(key, kind="stable")
-        key = key[order]
+        order, key = in_order(side_keys(self.corners, len(self.cloud.nodes)))
         first = np.flatnonzero(np.diff(key, prepend=-1))
         beside = np.full((len(first), 2), -1)
         beside[:, 0] = order[first] // 3

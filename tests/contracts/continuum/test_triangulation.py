@@ -144,3 +144,13 @@ def test_walls_have_numbers_and_the_inside_none() -> None:
     )
     np.testing.assert_array_equal(cloud.walls, [1, 2, 1, 0])
     np.testing.assert_array_equal(cloud.on_boundary, [True, True, True, False])
+
+
+@pytest.mark.parametrize("largest", [0, 9, 2**62])
+@pytest.mark.parametrize("count", [0, 1, 50])
+def test_whole_numbers_in_order_with_their_places(largest: int, count: int) -> None:
+    """Equal ones stay as they were, also where places do not fit beside the numbers."""
+    keys = np.random.default_rng(5).integers(0, largest + 1, count)
+    order, in_order = triangulation.in_order(keys)
+    np.testing.assert_array_equal(order, np.argsort(keys, kind="stable"))
+    np.testing.assert_array_equal(in_order, keys[order])
