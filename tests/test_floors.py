@@ -42,10 +42,10 @@ def top_of(path: Path) -> str:
 
 
 def allowed_by(docstring: str) -> set[str]:
-    """The packages that a package's docstring says it may import: "It may import series, contracts and results."."""
+    """The packages that a docstring allows: "It may import series, contracts and results.", or nothing."""
     found = PROMISE.search(docstring)
     assert found, f"no sentence 'It may import …' in {docstring!r}"
-    return {name for name in re.split(r",\s*|\s+and\s+", found[1].strip())}
+    return {name for name in re.split(r",\s*|\s+and\s+", found[1].strip())} - {"nothing"}
 
 
 def rules_of(house: Path) -> dict[str, set[str]]:

@@ -76,7 +76,7 @@ class Expansion:
     def remainder(self, j: int) -> Array:
         """Q_j of R_j = J u_j + Q_j, where u_j is the next to be appended: R_j as it would be with u_j = 0."""
         self._path.append(np.zeros(self._path.shape))
-        remainder = self._residual.coefficient(j)
+        remainder = self._residual.coefficient(j).copy()  # R_j will be written where this was
         self._path.forget(j)
         return remainder
 

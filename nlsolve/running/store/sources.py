@@ -25,7 +25,7 @@ from types import CodeType, FunctionType, ModuleType
 
 from nlsolve.registry.installed.hookspecs import PROJECT
 
-NUMERICS = ("series.py", "algebra", "contracts", "flow", "solving", "results/verdicts.py")
+NUMERICS = ("series", "algebra", "contracts", "flow", "solving", "results/verdicts.py")
 """What of nlsolve computes numbers: files, and folders with all their files."""
 
 NOT_COUNTED = sys.stdlib_module_names | {"pydantic"}
