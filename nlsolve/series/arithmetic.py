@@ -134,16 +134,16 @@ def power(x: Series, exponent: float, function: Callable[[Array], Array] | None 
 
     function, name : x ↦ x^α and its name, where it has one of its own.
     """
-    name = name or f"x**{exponent:g}"
+    name, start = name or f"x**{exponent:g}", x.coefficient(0)
+    at_zero = start == 0.0
+    any_at_zero = bool(at_zero.any())
 
     def rule(j: int) -> Array:
-        start = x.coefficient(0)
         if j == 0:
             return start**exponent if function is None else function(start)
         slope = x.head(j)[1:]
         sums = convolve(slope, y.head(j - 1), (exponent + 1.0) / j * np.arange(1.0, j + 1.0) - 1.0)
-        at_zero = start == 0.0
-        if not at_zero.any():
+        if not any_at_zero:
             if j == 1 and np.isnan(y.coefficient(0)[start < 0.0]).any():
                 raise NoSeriesHere(name, start, start < 0.0, UNREAL)
             return sums / start

@@ -13,7 +13,7 @@ from pydantic import Field
 from nlsolve.plugin import Cloud, Discretizer, Operators, PointOperators, SolveError
 from nlsolve_discretizers import kernels
 from nlsolve_discretizers.conservation import conserving
-from nlsolve_discretizers.kernels.offsets import offsets
+from nlsolve_discretizers.kernels.offsets import over_radius
 from nlsolve_discretizers.kernels.rows import sparse_rows
 from nlsolve_discretizers.weights.assembly import Gradient
 from nlsolve_discretizers.weights.diagnostics import diagnosis
@@ -71,10 +71,10 @@ class Collocation(Discretizer):
 
     @abstractmethod
     def local_weights(
-        self, offsets: np.ndarray, radius: np.ndarray, derivatives: Derivatives
+        self, places: np.ndarray, radius: np.ndarray, derivatives: Derivatives
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Weights (D, T, k) of D derivatives for neighbours at `offsets` (2, k, T), and the quality (T,) of the
-        supports: 0 for one that determines nothing.
+        """Weights (D, T, k) of D derivatives for neighbours at `places` x, y, |(x, y)| (3, k, T) over the radius (T,)
+        [mm], and the quality (T,) of the supports: 0 for one that determines nothing.
         """
 
     @abstractmethod
@@ -101,8 +101,9 @@ class Collocation(Discretizer):
         renew = np.arange(len(targets))
         for attempt in range(self.growths + 1):
             for count, which in _batches(supports.count, renew):
-                apart = offsets(sources, targets[which], supports.index[which, :count])
-                found[:, which, :count], quality[which] = self.local_weights(apart, supports.radius[which], derivatives)
+                radius = supports.radius[which]
+                near_by = over_radius(sources, targets[which], supports.index[which, :count], radius)
+                found[:, which, :count], quality[which] = self.local_weights(near_by, radius, derivatives)
             renew = np.flatnonzero(~(quality >= self.weak))
             larger = np.minimum(supports.count[renew] + (supports.count[renew] + 1) // 2, len(sources) - 1)
             if attempt == self.growths or not (larger > supports.count[renew]).any():

@@ -57,10 +57,10 @@ class MovingLeastSquares(Collocation):
         return Supports.nearest(sources, targets, count, self.balanced, lists)
 
     def local_weights(
-        self, offsets: np.ndarray, radius: np.ndarray, derivatives: Derivatives
+        self, places: np.ndarray, radius: np.ndarray, derivatives: Derivatives
     ) -> tuple[np.ndarray, np.ndarray]:
         """Weights by least squares; the quality of a support is its smallest pivot."""
-        return fit(offsets, radius, self.degree, derivatives, self.weight, self.shape)
+        return fit(places, radius, self.degree, derivatives, self.weight, self.shape)
 
     def refusal(self, count: int, place: np.ndarray, quality: float) -> SolveError | None:
         """An error (bad cloud) if the neighbours do not determine the polynomial."""

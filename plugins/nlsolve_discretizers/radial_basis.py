@@ -91,12 +91,12 @@ class RadialBasis(Collocation):
         return supports.replaced(near, larger)
 
     def local_weights(
-        self, offsets: np.ndarray, radius: np.ndarray, derivatives: Derivatives
+        self, places: np.ndarray, radius: np.ndarray, derivatives: Derivatives
     ) -> tuple[np.ndarray, np.ndarray]:
         """Weights by interpolation; the quality of a support is the reciprocal condition number of its local system."""
-        radius_in_spacings = (offsets.shape[1] / np.pi) ** 0.5
+        radius_in_spacings = (places.shape[1] / np.pi) ** 0.5
         phi = kernel(self.kernel, self.power, self.shape * radius_in_spacings)
-        return interpolate(offsets, radius, self.degree, derivatives, phi)
+        return interpolate(places, radius, self.degree, derivatives, phi)
 
     def refusal(self, count: int, place: np.ndarray, quality: float) -> SolveError | None:
         """An error (ill conditioned) if the local system cannot be solved in working precision."""

@@ -38,15 +38,15 @@ def monomials(degree: int) -> list[tuple[int, int]]:
 
 
 def fit(
-    offsets: np.ndarray, radius: np.ndarray, degree: int, derivatives: Derivatives, weight: str, shape: float
+    places: np.ndarray, radius: np.ndarray, degree: int, derivatives: Derivatives, weight: str, shape: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """φ (D, T, k) for each of D derivatives ∂^(i+j)/∂x^i∂y^j, from neighbours at `offsets` (2, k, T) of T targets.
+    """φ (D, T, k) for each of D derivatives ∂^(i+j)/∂x^i∂y^j, from neighbours at `places` x, y, |(x, y)| (3, k, T)
+    over the `radius` (T,) of the support of each of T targets.
 
     Also the smallest pivot of R relative to its column, (T,): 1 for orthogonal monomials, 0 where the support does not
     determine a polynomial of `degree` and φ means nothing.
     """
-    x, y = offsets / radius
-    distance = np.sqrt(x * x + y * y)
+    x, y, distance = places
     w = np.where(distance < 1.0, weight_function(weight, distance, shape), 0.0)
     unscaled = np.stack([(1.0 / radius) ** (i + j) for i, j in derivatives])
     phi, smallest = fitted(x, y, w, degree, derivatives, unscaled)

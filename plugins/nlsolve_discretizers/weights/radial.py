@@ -50,14 +50,15 @@ def _wendland(shape: float) -> Kernel:
 
 
 def interpolate(
-    offsets: np.ndarray, radius: np.ndarray, degree: int, derivatives: Derivatives, phi: Kernel
+    places: np.ndarray, radius: np.ndarray, degree: int, derivatives: Derivatives, phi: Kernel
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Weights (D, T, k) of D derivatives ∂^(i+j)/∂x^i∂y^j up to the second, from neighbours at `offsets` (2, k, T).
+    """Weights (D, T, k) of D derivatives ∂^(i+j)/∂x^i∂y^j up to the second, from neighbours at
+    `places` x, y, … (3, k, T) over the `radius` (T,).
 
     Also an estimate of the reciprocal condition number of each local system, (T,): 0 where it is singular. It comes
     from one more right-hand side b of signs: ‖A⁻¹ b‖₂ is on average ‖A⁻¹‖_F.
     """
-    x, y = offsets / radius
+    x, y, _ = places
     k, targets = x.shape
     exponents = monomials(degree)
     system = np.zeros((targets, k + len(exponents), k + len(exponents)))

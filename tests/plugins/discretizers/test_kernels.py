@@ -16,7 +16,7 @@ from clouds import CLOUDS, jittered_points
 from nlsolve_discretizers import LinearTriangles, MovingLeastSquares, RadialBasis, kernels
 from nlsolve_discretizers.kernels import machine_code, normal_equations, quadrants, ranking, rows
 from nlsolve_discretizers.kernels.machine_code import compiled, compiler_name, numpy_alone
-from nlsolve_discretizers.kernels.offsets import offsets
+from nlsolve_discretizers.kernels.offsets import offsets, over_radius
 from nlsolve_discretizers.weights.supports import Supports
 
 from nlsolve.plugin import Cloud, Discretizer
@@ -140,6 +140,15 @@ def test_compiled_weights_tell_supports_that_determine_nothing() -> None:
         _, other = normal_equations.fitted(x, y, w, 2, ((1, 0),))
     np.testing.assert_array_equal(smallest, other)
     assert (smallest < 1e-7).all()
+
+
+@needs_numba
+def test_compiled_places_are_numpys() -> None:
+    sources, targets = jittered_points(3), jittered_points(4)
+    supports = Supports.nearest(sources, targets, 9)
+    places = over_radius(sources, targets, supports.index, supports.radius)
+    with numpy_alone():
+        np.testing.assert_array_equal(places, over_radius(sources, targets, supports.index, supports.radius))
 
 
 @needs_numba

@@ -10,6 +10,7 @@ from cases import setup
 from clouds import CLOUDS, jittered_points
 from nlsolve_discretizers import MovingLeastSquares, RadialBasis
 from nlsolve_discretizers.collocation import GRADIENT
+from nlsolve_discretizers.kernels.offsets import scaled
 from nlsolve_discretizers.weights.least_squares import monomials
 from nlsolve_discretizers.weights.radial import interpolate, kernel
 from nlsolve_discretizers.weights.supports import Supports
@@ -47,7 +48,9 @@ def test_weights_interpolate_the_kernel_of_every_neighbour(name: str) -> None:
     """Σ_i w_i φ(|x_i − x_j|) = L φ(|x − x_j|) for each neighbour j; L of the right by central differences."""
     phi, of_radius = KERNELS[name]
     offsets = jittered_points(2, side=4)[None, :12] - [0.4, 0.35]
-    (w_x, w_xy, w_yy), quality = interpolate(offsets.T, np.ones(1), 2, ((1, 0), (1, 1), (0, 2)), phi)
+    (w_x, w_xy, w_yy), quality = interpolate(
+        scaled(offsets.T, np.ones(1)), np.ones(1), 2, ((1, 0), (1, 1), (0, 2)), phi
+    )
     assert quality[0] > 1e-13
     distance = np.linalg.norm(offsets[0][:, None] - offsets[0][None], axis=2)
 
@@ -96,10 +99,10 @@ def test_the_estimated_condition_number_is_that_of_the_local_system() -> None:
     offsets = x[supports.index] - 0.5
     for name, power, shape in (("phs", 3, 0.0), ("phs", 7, 0.0), ("gaussian", 3, 1.0), ("gaussian", 3, 0.3)):
         phi = kernel(name, power, shape)
-        _, quality = interpolate(offsets.T, supports.radius, 2, GRADIENT, phi)
-        scaled = offsets[0] / supports.radius[0]
-        p = np.stack([scaled[:, 0] ** i * scaled[:, 1] ** j for i, j in monomials(2)], axis=1)
-        distance = ((scaled[:, None] - scaled[None]) ** 2).sum(axis=2)
+        _, quality = interpolate(scaled(offsets.T, supports.radius), supports.radius, 2, GRADIENT, phi)
+        places = offsets[0] / supports.radius[0]
+        p = np.stack([places[:, 0] ** i * places[:, 1] ** j for i, j in monomials(2)], axis=1)
+        distance = ((places[:, None] - places[None]) ** 2).sum(axis=2)
         system = np.block([[phi(distance), p], [p.T, np.zeros((6, 6))]])
         assert 1 / 30 < quality[0] * np.linalg.cond(system, "fro") < 30
 
@@ -146,8 +149,8 @@ def test_one_singular_system_does_not_spoil_the_others() -> None:
     sound = jittered_points(2, side=4)[None, :12] - 0.4
     line = np.stack([np.arange(12.0), np.zeros(12)], axis=1)[None] / 12.0
     phi = kernel("phs", 3, 0.0)
-    alone, _ = interpolate(sound.T, np.ones(1), 2, GRADIENT, phi)
-    both, quality = interpolate(np.concatenate([line, sound]).T, np.ones(2), 2, GRADIENT, phi)
+    alone, _ = interpolate(scaled(sound.T, np.ones(1)), np.ones(1), 2, GRADIENT, phi)
+    both, quality = interpolate(scaled(np.concatenate([line, sound]).T, np.ones(2)), np.ones(2), 2, GRADIENT, phi)
     np.testing.assert_allclose(both[:, 1], alone[:, 0], rtol=1e-10)
     assert quality[0] < 1e-14 < quality[1]
 

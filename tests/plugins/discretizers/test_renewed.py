@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from clouds import CLOUDS, jittered_points
 from nlsolve_discretizers import LinearTriangles, MovingLeastSquares, RadialBasis
-from nlsolve_discretizers.kernels.offsets import offsets
+from nlsolve_discretizers.kernels.offsets import over_radius, scaled
 from nlsolve_discretizers.weights import least_squares
 from nlsolve_discretizers.weights.least_squares import SOUND, fit
 from nlsolve_discretizers.weights.lists import Lists
@@ -184,7 +184,8 @@ def test_the_normal_equations_give_the_weights_of_the_orthogonal_columns(
 ) -> None:
     sources, targets = jittered_points(3), 0.1 + 0.8 * np.random.default_rng(1).random((80, 2))
     supports = Supports.nearest(sources, targets, 6 * (degree + 1))
-    given = offsets(sources, targets, supports.index), supports.radius, degree, ((0, 0), (1, 0), (0, 1)), weight, 3.0
+    places = over_radius(sources, targets, supports.index, supports.radius)
+    given = places, supports.radius, degree, ((0, 0), (1, 0), (0, 1)), weight, 3.0
     phi, quality = fit(*given)
     monkeypatch.setattr(least_squares, "SOUND", np.inf)
     careful, pivot = fit(*given)
@@ -199,7 +200,7 @@ def test_poor_supports_are_left_to_the_orthogonal_columns() -> None:
     along, height = np.linspace(-1.0, 1.0, 10), np.random.default_rng(2).uniform(-1.0, 1.0, 10)
     for flat in (1e-2, 1e-4, 0.0):
         near = np.stack([along, 0.5 * along + flat * height])[..., None]
-        phi, quality = fit(near, np.array([1.1]), 2, ((1, 0), (0, 1)), "gaussian", 3.0)
+        phi, quality = fit(scaled(near, np.array([1.1])), np.array([1.1]), 2, ((1, 0), (0, 1)), "gaussian", 3.0)
         if flat:
             assert 0.1 * flat**2 < quality[0] < flat
             np.testing.assert_allclose(phi[:, 0] @ near[..., 0].T, np.eye(2), rtol=0.0, atol=1e-14 / quality[0])
