@@ -21,10 +21,12 @@ def as_column(values: ArrayLike, u: Array | Series) -> Array:
 
 
 def constant(value: Any) -> Array:
+    """The numbers of a constant."""
     return np.asarray(value, dtype=float)
 
 
 def constant_series(value: Any) -> Series:
+    """c + 0 a + 0 a² + …"""
     start = constant(value)
     return Series.by_rule(lambda j: start if j == 0 else np.zeros_like(start))
 
@@ -98,6 +100,7 @@ def derivative_convolve(x: Series, y: Series, j: int) -> Array:
 
 
 def product(x: Series, y: Series) -> Series:
+    """z_j = Σ_l x_l y_{j−l}, a square at half the price."""
     if x is not y:
         return Series.by_rule(lambda j: convolve(x.head(j), y.head(j)), x, y)
 
@@ -114,6 +117,8 @@ def product(x: Series, y: Series) -> Series:
 
 
 def quotient(x: Series, y: Series) -> Series:
+    """q = x/y:  y₀ q_j = x_j − Σ_{l=1..j} y_l q_{j−l}."""
+
     def rule(j: int) -> Array:
         start = y.coefficient(0)
         if j == 0:
@@ -158,4 +163,5 @@ def power(x: Series, exponent: float, function: Callable[[Array], Array] | None 
 
 
 def steep(order: int) -> str:
+    """Why there is no further coefficient where the derivative of an order is infinite."""
     return STEEP if order == 1 else f"its derivative of order {order} is infinite there"
