@@ -1,8 +1,4 @@
-"""R(v) = W ρ ((v − v_k)/Δt + (v·∇) v) − S s(B v) − S_θ (λ B_θ v − p) − W f : the discrete balance of momentum.
-
-It holds at the interior nodes; W are the areas of their material in a conservative form, 1 in a strong one. Terms that
-the scene leaves out are absent, not zero. The same formula runs on arrays and on series.
-"""
+"""The problem R(u) = 0 of a flow at one time, and what is read from its states."""
 
 from __future__ import annotations
 
@@ -18,14 +14,15 @@ import scipy.sparse as sp
 
 from nlsolve.contracts.continuum.cloud import Cloud, node_major
 from nlsolve.contracts.continuum.discretizer import Discretizer, Operators, PointOperators
-from nlsolve.contracts.continuum.law import ConstitutiveLaw, Number, rate_squared, stress, tangent_moduli
+from nlsolve.contracts.continuum.law import ConstitutiveLaw, Number, stress, tangent_moduli
 from nlsolve.contracts.problem import Expansion, NonlinearProblem
 from nlsolve.contracts.status import SolveError, Status
 from nlsolve.flow.convection import Carried, Convection
+from nlsolve.flow.momentum import places
+from nlsolve.flow.momentum.expansion import FlowExpansion, Placing
+from nlsolve.flow.momentum.matrices import isotropic, magnitude, pointwise, secant_moduli
 from nlsolve.flow.motion.point_rates import PointRates
-from nlsolve.series import Array, Indices, NoSeriesHere, Series
-
-WAY_OUT = "give it a regularization ε₀ > 0, or begin from a state that is deformed everywhere (start.values)"
+from nlsolve.series import Array, NoSeriesHere, Series
 
 
 @dataclass(frozen=True)
@@ -77,7 +74,7 @@ class Flow(NonlinearProblem):
         lifted = np.zeros(2 * len(cloud.nodes))
         lifted[node_major(cloud.boundary)] = boundary_velocity.ravel()
         self._lifted = lifted
-        self._inside = _Placing(self._free, len(lifted))
+        self._inside = Placing(self._free, len(lifted))
         self.drift = drift
         self._force = operators.strain.force
         self._volumetric: PointOperators | None = None
@@ -119,7 +116,7 @@ class Flow(NonlinearProblem):
         Its coefficients raise SolveError (non-finite) where the law has no series at a strain rate of u.
         """
         path = Series(u)
-        return _Expansion(path, self._balance(path, self._stresses(path)), self)
+        return FlowExpansion(path, self._balance(path, self._stresses(path)), self.without_series)
 
     def _stresses_at(self, u: Array) -> tuple[Array, Array | None]:
         """`_stresses` of a state, kept: a solve asks for `scale` and `residual` where it starts."""
@@ -209,21 +206,8 @@ class Flow(NonlinearProblem):
 
     def _linearized(self, moduli: Array, carried: Any) -> Any:
         """W ρ/Δt + carried − S C B − S_θ λ B_θ with pointwise moduli C (3, 3, M)."""
-        points = moduli.shape[2]
-        # −C as a sparse matrix with three entries a row: row a M + m holds columns m, M + m, 2 M + m.
-        columns = (
-            np.arange(points, dtype=np.int32)[None, :, None] + points * np.arange(3, dtype=np.int32)[None, None, :]
-        )
-        pointwise = sp.csr_array(
-            (
-                -np.ascontiguousarray(moduli.transpose(0, 2, 1)).ravel(),
-                np.broadcast_to(columns, (3, points, 3)).ravel(),
-                np.arange(0, 9 * points + 1, 3, dtype=np.int32),
-            ),
-            shape=(3 * points, 3 * points),
-        )
         # S C has fewer entries than C B.
-        parts = [(self._force @ pointwise) @ self._strain, self._without_stress, carried]
+        parts = [(self._force @ pointwise(-moduli)) @ self._strain, self._without_stress, carried]
         return reduce(add, (part for part in parts if part is not None))
 
     @cached_property
@@ -245,10 +229,10 @@ class Flow(NonlinearProblem):
     def scale(self, u: Array) -> float:
         """‖|S| |s| + |S_θ| |λ B_θ v| + W ρ |v/Δt + v·∇ v| + |constant|‖₂: the size of the forces that cancel in R."""
         deviatoric, volumetric = self._stresses_at(u)
-        terms = _magnitude(self._force) @ np.abs(deviatoric)
+        terms = magnitude(self._force) @ np.abs(deviatoric)
         terms += np.abs(self._constant)
         if self._volumetric is not None and volumetric is not None:
-            terms += _magnitude(self._volumetric.force) @ np.abs(volumetric)
+            terms += magnitude(self._volumetric.force) @ np.abs(volumetric)
         if self._inertia is not None:
             terms += self._inertia * np.abs(u)
         if self._carried is not None:
@@ -257,47 +241,15 @@ class Flow(NonlinearProblem):
 
     def undefined(self, u: Array) -> str:
         """The first strain point where the viscosity is not finite, and how many there are."""
-        squared = rate_squared(self.strain_rate(u))
-        where = ~np.isfinite(self.law.viscosity(squared))
-        if not (where & np.isfinite(squared)).any():
-            return ""
-        return f"the law {self.law.called()!r} has no finite viscosity at {self._spot(u, where)}; {WAY_OUT}"
+        return places.undefined(self.law, self.operators.strain.points, self.strain_rate(u))
 
     def without_series(self, u: Array, refusal: NoSeriesHere) -> SolveError:
         """The error of a law whose formula has refused to give the series, with a strain point where it does not."""
-        squared = rate_squared(self.strain_rate(u))
-        where = squared == 0.0
-        if not where.any() and refusal.entry and refusal.entry[-1] < len(squared):
-            where[refusal.entry[-1]] = True
-        spot = f" at {self._spot(u, where)}" if where.any() else ""
-        return SolveError(
-            Status.NON_FINITE,
-            f"the law {self.law.called()!r} has no series{spot}: {refusal}; {WAY_OUT}, or choose a method that "
-            "needs no series, such as newton",
-        )
-
-    def _spot(self, u: Array, where: Any) -> str:
-        """The first of the strain points that are marked, its strain rate, and their number."""
-        (x, y), rate = self.operators.strain.points[where][0], np.sqrt(rate_squared(self.strain_rate(u))[where][0])
-        return f"({x:.3g}, {y:.3g}), where ε̄ = {rate:.2g} 1/s ({where.sum()} of {len(where)} strain points)"
+        return places.without_series(self.law, self.operators.strain.points, self.strain_rate(u), refusal)
 
     def blame(self, u: Array, residual: Array) -> Mapping[str, float]:
-        """The node where ‖R‖ is largest, the strain rate at the strain point nearest to it, and the share of the strain
-        points where ε̄ < ε₀, where the regularization sets the viscosity. Of nodes where R is not finite, the one where
-        that strain rate is least.
-        """
-        forces = np.nan_to_num(np.linalg.norm(residual.reshape(-1, 2), axis=1), nan=np.inf)
-        largest = self.cloud.interior[np.flatnonzero(forces == forces.max())]
-        rate = np.sqrt(rate_squared(self.strain_rate(u)))
-        beside = scipy.spatial.cKDTree(self.operators.strain.points).query(self.cloud.nodes[largest])[1]
-        node, nearest = min(zip(largest, beside, strict=True), key=lambda pair: float(rate[pair[1]]))
-        floor = self.law.regularization_rate or 0.0
-        return {
-            "blame_x": float(self.cloud.nodes[node, 0]),
-            "blame_y": float(self.cloud.nodes[node, 1]),
-            "blame_rate": float(rate[nearest]),
-            "blame_regularized": float(np.mean(rate < floor)),
-        }
+        """See `places.blame`."""
+        return places.blame(self.cloud, self.law, self.operators.strain.points, self.strain_rate(u), residual)
 
     def velocity(self, u: Array) -> Array:
         """Velocities of all nodes, boundary included, shape (N, 2) [mm/s]."""
@@ -331,55 +283,3 @@ class Flow(NonlinearProblem):
         """p − λ tr ε̇ at the volume points, shape (L,) [MPa], the next p of an iterated penalty; None without one."""
         rate = self.dilatation_rate(u)
         return None if rate is None or self._modulus is None else self._pressure - self._modulus * rate
-
-
-@dataclass(frozen=True)
-class _Placing:
-    """The matrix (size, U) that puts entry i of a vector at place free[i] of a longer one, which is zero elsewhere."""
-
-    free: Indices
-    size: int
-
-    def __matmul__(self, u: Array) -> Array:
-        if not isinstance(u, np.ndarray):  # a series asks for each of its coefficients
-            return NotImplemented
-        placed = np.zeros(self.size)
-        placed[self.free] = u
-        return placed
-
-
-class _Expansion(Expansion):
-    """The expansion of a flow, whose law may have no series at a strain rate."""
-
-    def __init__(self, path: Series, residual: Series, flow: Flow) -> None:
-        super().__init__(path, residual)
-        self._flow = flow
-
-    def coefficient(self, j: int) -> Array:
-        try:
-            return super().coefficient(j)
-        except NoSeriesHere as refusal:
-            raise self._flow.without_series(self._path.coefficient(0), refusal) from refusal
-
-    def remainder(self, j: int) -> Array:
-        try:
-            return super().remainder(j)
-        except NoSeriesHere as refusal:
-            raise self._flow.without_series(self._path.coefficient(0), refusal) from refusal
-
-
-def _magnitude(matrix: Any) -> Any:
-    """|A|, with the same places as A."""
-    if not sp.issparse(matrix):
-        return abs(matrix)
-    return sp.csr_array((np.abs(matrix.data), matrix.indices, matrix.indptr), shape=matrix.shape)
-
-
-def secant_moduli(law: ConstitutiveLaw, strain_rate: Array) -> Array:
-    """C = 2 μ I [MPa s], shape (3, 3, M), so that s = C ε̇, for strain rates (3, M) ordered xx, yy, xy."""
-    return isotropic(law.viscosity(rate_squared(strain_rate)))
-
-
-def isotropic(viscosity: Array) -> Array:
-    """C = 2 μ I [MPa s], shape (3, 3, M), of viscosities μ (M,)."""
-    return 2.0 * np.eye(3)[:, :, None] * viscosity
