@@ -74,12 +74,11 @@ class Lists:
 
         sources_before, targets_before : the number that each of them had, −1 for new ones; None: the same as now.
         """
-        steps = np.zeros(len(self.sources))
-        if sources_before is None:
-            steps = _steps(self.sources, sources, None)
-        else:
-            old = np.flatnonzero(sources_before >= 0)
-            steps[sources_before[old]] = _steps(self.sources[sources_before[old]], sources[old], None)
+        steps = _steps(self.sources, sources, sources_before)
+        if sources_before is not None:
+            moved, steps = steps, np.zeros(len(self.sources) + 1)
+            steps[sources_before] = moved  # of new ones, which have no number, behind the others
+            steps = steps[:-1]
         within = np.max(self.reach, where=np.isfinite(self.reach), initial=0.0) + steps.max(initial=0.0)
         reach = self.reach - largest_near(self.sources, steps, self.targets, float(within))
         if targets_before is not None:
@@ -145,7 +144,7 @@ def by_tree(
 def _steps(before: np.ndarray, now: np.ndarray, numbers: np.ndarray | None) -> np.ndarray:
     """|δx| of the places `now` (P, 2), 0 for new ones."""
     if numbers is not None:
-        return np.where(numbers < 0, 0.0, _steps(before[numbers], now, None))
+        return np.where(numbers < 0, 0.0, _steps(before.take(numbers, axis=0), now, None))
     dx, dy = now.T - before.T
     steps: np.ndarray = np.sqrt(dx * dx + dy * dy)
     return steps
@@ -159,6 +158,6 @@ def _as_they_are(targets: int, sources: int) -> tuple[np.ndarray, np.ndarray]:
 def _numbers_now(numbers_before: np.ndarray, count_before: int) -> np.ndarray:
     """The number now of each that there was before, −1 for those that are no more and, at the end, for number −1."""
     now = np.full(count_before + 1, -1)
-    old = np.flatnonzero(numbers_before >= 0)
-    now[numbers_before[old]] = old
+    now[numbers_before] = np.arange(len(numbers_before))
+    now[-1] = -1
     return now
