@@ -315,6 +315,16 @@ def test_what_is_taken_back_is_computed_anew(name: str, monkeypatch: pytest.Monk
     np.testing.assert_allclose(coefficients(formula, 5), right, rtol=1e-12, atol=1e-14)
 
 
+@pytest.mark.parametrize("name", CLOSED)
+def test_earlier_coefficients_are_the_same_when_they_are_asked_for_again(name: str) -> None:
+    """Also those of a series that keeps its last one only, and after all have been packed."""
+    formula = CLOSED[name][0]()
+    first = [formula.coefficient(j).copy() for j in range(6)]
+    again = [formula.coefficient(j) for j in reversed(range(6))]
+    np.testing.assert_array_equal(again[::-1], first)
+    np.testing.assert_array_equal(formula.head(5), first)
+
+
 def test_the_start_of_a_series_cannot_be_taken_back() -> None:
     with pytest.raises(ValueError, match="coefficient 0 cannot be taken back: a series keeps y_0"):
         Series([1.0]).forget(0)

@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from nlsolve.contracts.problem import least_squares
+from nlsolve.contracts.problem import Expansion, least_squares
 from nlsolve.contracts.status import SolveError, Status
+from nlsolve.series import Series
 
 
 def test_least_squares_leave_a_residual_orthogonal_to_the_columns():
@@ -33,3 +34,13 @@ def test_numbers_that_are_not_finite_are_a_status_and_print_nothing(odd, where, 
         least_squares(**given)
     assert raised.value.status is Status.NON_FINITE
     assert capfd.readouterr() == ("", "")
+
+
+def test_a_remainder_stays_when_the_coefficient_that_it_left_out_is_pushed():
+    """R(u) = u, whose coefficients are those of the path itself."""
+    path = Series(np.ones(2))
+    expansion = Expansion(path, path)
+    remainder = expansion.remainder(1)
+    expansion.append(np.array([3.0, 4.0]))
+    np.testing.assert_array_equal(remainder, np.zeros(2))
+    np.testing.assert_array_equal(expansion.coefficient(1), [3.0, 4.0])
