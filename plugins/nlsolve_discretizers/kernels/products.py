@@ -69,34 +69,37 @@ def divergence_of_stress(near: np.ndarray, both: np.ndarray, magnitudes: bool, s
     return force
 
 
-def gradient(near: np.ndarray, both: np.ndarray, magnitudes: bool, pressure: np.ndarray) -> np.ndarray:
-    """∂p/∂x and ∂p/∂y, node-major, (2 T,)."""
-    targets, k = near.shape
-    force = np.empty(2 * targets)
-    for t in range(targets):
-        x = y = 0.0
-        for n in range(k):
+def gradient(
+    near: np.ndarray, both: np.ndarray, magnitudes: bool, pressure: np.ndarray, targets: np.ndarray
+) -> np.ndarray:
+    """∂p/∂x and ∂p/∂y at some of the targets (R,), node-major, (2 R,)."""
+    force = np.empty(2 * len(targets))
+    for r in range(len(targets)):
+        t, x, y = targets[r], 0.0, 0.0
+        for n in range(near.shape[1]):
             dx, dy = weights(both, t, n, magnitudes)
             x += dx * pressure[near[t, n]]
             y += dy * pressure[near[t, n]]
-        force[2 * t], force[2 * t + 1] = x, y
+        force[2 * r], force[2 * r + 1] = x, y
     return force
 
 
 STRAIN_RATE, DIVERGENCE, DIVERGENCE_OF_STRESS, GRADIENT = range(4)
 
 
-def product(which: int, near: np.ndarray, both: np.ndarray, magnitudes: bool, vector: np.ndarray) -> np.ndarray:
-    """One of the four."""
+def product(
+    which: int, targets: np.ndarray, near: np.ndarray, both: np.ndarray, magnitudes: bool, vector: np.ndarray
+) -> np.ndarray:
+    """One of the four; of a gradient at some `targets` (R,), of the others at all."""
     if which == STRAIN_RATE:
         return strain_rate(near, both, magnitudes, vector)
     if which == DIVERGENCE:
         return divergence(near, both, magnitudes, vector)
     if which == DIVERGENCE_OF_STRESS:
         return divergence_of_stress(near, both, magnitudes, vector)
-    return gradient(near, both, magnitudes, vector)
+    return gradient(near, both, magnitudes, vector, targets)
 
 
 def machine_code() -> Callable[..., Any] | None:
     """`product`, compiled; None where there is no compiler."""
-    return compiled(product, "i0 u2c f3c b0 f1c", weights, strain_rate, divergence, divergence_of_stress, gradient)
+    return compiled(product, "i0 u1c u2c f3c b0 f1c", weights, strain_rate, divergence, divergence_of_stress, gradient)

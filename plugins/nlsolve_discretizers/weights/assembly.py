@@ -18,10 +18,15 @@ X, Y = 0, 1
 
 @dataclass(frozen=True)
 class Gradient:
-    """∂/∂x and ∂/∂y at T targets: neighbours `near` (T, k) among the sources, weights `both` (2, T, k) [1/mm]."""
+    """∂/∂x and ∂/∂y at T targets: neighbours `near` (T, k) among the sources, weights `both` (2, T, k) [1/mm].
+
+    targets : those that are meant, (R,); None: all. The weights of the others are kept: what reads both the ones and
+        all reads them once into the cache.
+    """
 
     near: np.ndarray
     both: np.ndarray
+    targets: np.ndarray | None = None
 
     @property
     def dx(self) -> np.ndarray:
@@ -40,7 +45,13 @@ class Gradient:
 
     def at(self, targets: np.ndarray) -> Gradient:
         """The same at some of the targets."""
-        return Gradient(self.near.take(targets, axis=0), self.both.take(targets, axis=1))
+        return Gradient(self.numbers, self.both, targets)
+
+    def rows(self) -> tuple[np.ndarray, np.ndarray]:
+        """Neighbours (R, k) and weights (2, R, k) of the targets that are meant."""
+        if self.targets is None:
+            return self.near, self.both
+        return self.near.take(self.targets, axis=0).astype(np.intp), self.both.take(self.targets, axis=1)
 
     def matrices(self, sources: int) -> tuple[Any, Any]:
         """Sparse (T, sources) matrices."""
@@ -69,7 +80,8 @@ class Gradient:
     def _unassembled(
         self, which: int, rows: Sequence[Row], stride: int, columns: int, of_target_together: bool = False
     ) -> Unassembled:
-        return Unassembled((len(rows) * len(self.near), columns), self, which, tuple(rows), stride, of_target_together)
+        count = len(self.near if self.targets is None else self.targets)
+        return Unassembled((len(rows) * count, columns), self, which, tuple(rows), stride, of_target_together)
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,7 +113,7 @@ class Unassembled:
 
     @cached_property
     def _matrix(self) -> Any:
-        near, both = self.weights.near, self.weights.both
+        near, both = self.weights.rows()
         both = np.abs(both) if self.magnitudes else both
         return sparse_rows(near, both, self.rows, self.stride, self.shape[1], self.of_target_together)
 
@@ -111,7 +123,9 @@ class Unassembled:
         code = products.machine_code()
         if code is None:
             return None
-        return partial(code, self.which, self.weights.numbers, np.ascontiguousarray(self.weights.both), self.magnitudes)
+        near, both, targets = self.weights.numbers, np.ascontiguousarray(self.weights.both), self.weights.targets
+        chosen = np.arange(len(near)) if targets is None else targets
+        return partial(code, self.which, chosen.astype(np.uint32), near, both, self.magnitudes)
 
     def __matmul__(self, other: Any) -> Any:
         if self._times is not None and isinstance(other, np.ndarray) and other.shape == self.shape[1:]:
