@@ -36,6 +36,7 @@ from taylor_hood import TaylorHood
 from threadpoolctl import threadpool_limits
 
 import nlsolve
+from nlsolve.flow.continuation import VALUES
 from nlsolve.solving.simulate import run_case
 
 LONG, GROWTH = 2.0, 3.0  # seconds of a run that is not repeated, and of a finer cloud over those of one before
@@ -82,7 +83,7 @@ def parts(method: str, motion: str, index: float, s: float, estimated: bool, res
         "physics": {} if motion == "spin" else {"penalty": 1e5},
         "discretizer": {"kind": "delaunay" if method == "finite elements" else method},
         "solver": SOLVERS[method],
-        "start": {"solver": SOLVERS[method], "tolerance": TOLERANCE, **({"values": []} if rest else {})},
+        "start": {"solver": SOLVERS[method], "tolerance": TOLERANCE, "values": [] if rest else list(VALUES)},
         "stop": {"tolerance": TOLERANCE},
     }
     case = nlsolve.Study.from_dict(study).cases[0].parts
