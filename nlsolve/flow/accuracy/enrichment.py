@@ -61,6 +61,15 @@ class Enriched:
         """Values at the coarser cloud's nodes (N, …) -> at all nodes (N + E, …): means of both ends."""
         return np.concatenate([values, values[self.ends].mean(axis=1)])
 
+    def interpolation(self, coarser: Cloud) -> Any:
+        """`carry` of velocities that are zero on the boundary, (2F, 2 F_c): from the unknowns of the `coarser` cloud
+        to those of this one, of each node side by side.
+        """
+        count, added = len(coarser.nodes), len(self.ends)
+        means = sp.csr_array((np.full(2 * added, 0.5), self.ends.ravel(), 2 * np.arange(added + 1)), (added, count))
+        carry = sp.vstack([sp.eye_array(count), means], format="csr")
+        return sp.kron(carry[self.cloud.interior][:, coarser.interior], sp.eye_array(2), format="csr")
+
 
 def inner_edges(cloud: Cloud) -> Indices:
     """The edges of the Delaunay triangulation with a node inside, (E, 2). Across a hole both ends are at its wall."""

@@ -10,10 +10,11 @@ The pressure that the penalty has built up is given to both beside the penalty, 
 compressibility is a small part of what it was: V* − V has the error of the penalty in it too (a step of Uzawa 1958;
 Fortin & Glowinski 1983).
 
-Newton's steps, two with each tangent and all with the factors of the first (`kept_factors`), end when a correction is
-small beside the way gone. Where the flow has a potential it falls at each step (`energy`): at n = 0.05 a residual made
-to fall instead cuts the steps so short that they end far from the solution. None of this is counted with the work of
-the method.
+Newton's steps, two with each tangent, end when a correction is small beside the way gone. The tangent of V_fine is
+solved by cycles with the factors of that of V_coarse (`two_grids`); beside a penalty, and where these fail, its steps
+all take the factors of the first one (`kept_factors`). Where the flow has a potential it falls at each step (`energy`):
+at n = 0.05 a residual made to fall instead cuts the steps so short that they end far from the solution. None of this is
+counted with the work of the method.
 """
 
 from __future__ import annotations
@@ -29,9 +30,9 @@ from nlsolve.contracts.continuum.discretizer import Discretizer
 from nlsolve.contracts.linear_solver import Factors, LinearSolver
 from nlsolve.contracts.rules.refresh import RefreshRule
 from nlsolve.contracts.status import SolveError, Status
-from nlsolve.flow.accuracy.enrichment import Completed, Finer, enriched, twice_as_fine
-from nlsolve.flow.accuracy.kept_factors import KeptFactors
-from nlsolve.flow.momentum import Flow
+from nlsolve.flow.accuracy.enrichment import Completed, Enriched, Finer, enriched, twice_as_fine
+from nlsolve.flow.accuracy.kept_factors import KeptFactors, Preconditioned
+from nlsolve.flow.accuracy.two_grids import Coarser
 from nlsolve.flow.state import FlowState
 from nlsolve.registry.nested import AnyRefresh
 from nlsolve.series import Array
@@ -91,16 +92,19 @@ def compared(state: FlowState, velocity: Array, before: Array | None) -> Compari
     if estimator is None:
         return NOTHING_TO_COMPARE
 
-    def solution(finer: Finer) -> Array:
-        return _solution(state, finer, estimator, velocity, before, work)[: len(velocity)]
+    def begun(finer: Finer) -> _Enriched:
+        return _Enriched(state, finer, estimator, velocity, before, work)
 
     here = state.cloud
     completed = estimator.completed(here)
     if len(completed.nodes) > len(here.nodes):
-        best = solution(Completed(completed, here))
+        best = begun(Completed(completed, here)).velocity()[: len(velocity)]
     else:
-        fine = solution(twice_as_fine(here))
-        best = fine + RICHARDSON * (fine - solution(enriched(here, np.empty((0, 2), dtype=int))))
+        same, finer = enriched(here, np.empty((0, 2), dtype=int)), twice_as_fine(here)
+        coarse = begun(same)
+        coarser = coarse.velocity()
+        fine = begun(finer).velocity(coarse.below(finer))[: len(velocity)]
+        best = fine + RICHARDSON * (fine - coarser)
     error = (best - velocity)[inside]
     return Comparison(
         float(np.linalg.norm(error) / np.linalg.norm(best[inside])),
@@ -121,36 +125,60 @@ class _Counted:
             return self.linear.factorize(matrix, previous)
 
 
-def _solution(
-    state: FlowState,
-    finer: Finer,
-    discretizer: Discretizer,
-    velocity: Array,
-    before: Array | None,
-    work: Ledger,
-) -> Array:
-    """V on an enriched cloud, whose nodes begin with those of `state`. Raises SolveError."""
-    there = state.enriched(finer, discretizer, velocity)
-    inertia = there.inertia_from(None if before is None else finer.carry(before))
-    flow = there.flow_of(state.parts.law, inertia)
-    return flow.velocity(_solved(flow, flow.unknowns(there.velocity), state, work))
+class _Enriched:
+    """The flow of `state` on an enriched cloud, and the factors of the tangent with which it was solved last."""
 
+    def __init__(
+        self,
+        state: FlowState,
+        finer: Finer,
+        discretizer: Discretizer,
+        velocity: Array,
+        before: Array | None,
+        work: Ledger,
+    ) -> None:
+        there = state.enriched(finer, discretizer, velocity)
+        inertia = there.inertia_from(None if before is None else finer.carry(before))
+        self.flow = there.flow_of(state.parts.law, inertia)
+        self._start = self.flow.unknowns(there.velocity)
+        self._method = state.parts.start.method(self.flow)
+        self._linear = _Counted(state.parts.linear.for_one_matrix(), work)
+        self._factors: Factors | None = None
 
-def _solved(flow: Flow, start: Array, state: FlowState, work: Ledger) -> Array:
-    """R(u) = 0 from `start` (U,), to the accuracy that an estimate needs. Raises SolveError."""
-    linear = KeptFactors(linear=_Counted(state.parts.linear.for_one_matrix(), work))
-    rule = RENEWED.validate_python({"kind": "every-m", "m": STEPS_WITH_EACH})
-    problem, tangent = CountedProblem(flow, Ledger()), Tangent(linear, rule, Ledger())
-    last, forces = start, np.linalg.norm(flow.residual(start))
-    if forces <= SOLVED * flow.scale(start):
-        return start
-    for step in islice(state.parts.start.method(flow).steps(problem, tangent, start), 1, MOST_STEPS + 1):
-        u = step.state.copy()
-        if not np.isfinite(u).all():
-            break
-        correction = np.linalg.norm(u - last) / float(step.notes.get("length", 1.0))
-        arrives = correction <= SMALL * np.linalg.norm(u - start)
-        if arrives and np.linalg.norm(flow.residual(u)) <= SMALL * forces:
-            return u
-        last = u
-    raise SolveError(Status.BUDGET_SPENT, f"Newton does not solve the flow in {MOST_STEPS} steps with twice the nodes")
+    def velocity(self, coarser: Coarser | None = None) -> Array:
+        """V, first of the nodes of `state`: R(u) = 0 to the accuracy that an estimate needs. Raises SolveError.
+
+        coarser : the tangent on the cloud that this one refines, if it serves here.
+        """
+        return self.flow.velocity(self._solved(coarser))
+
+    def below(self, finer: Enriched) -> Coarser | None:
+        """The tangent here for a flow on twice as fine triangles. None where two grids do not solve that: where it is
+        no gradient, or where the penalty holds motions together that differ from node to node.
+        """
+        if not self.flow.is_gradient or self.flow.pressure(self._start) is not None:
+            return None
+        factors = self._factors or self._linear.factorize(self.flow.jacobian(self._start))
+        return Coarser(factors, finer.interpolation(self.flow.cloud))
+
+    def _solved(self, coarser: Coarser | None) -> Array:
+        flow, start = self.flow, self._start
+        linear = KeptFactors(linear=self._linear, coarser=coarser)
+        rule = RENEWED.validate_python({"kind": "every-m", "m": STEPS_WITH_EACH})
+        problem, tangent = CountedProblem(flow, Ledger()), Tangent(linear, rule, Ledger())
+        last, forces = start, np.linalg.norm(flow.residual(start))
+        if forces <= SOLVED * flow.scale(start):
+            return start
+        for step in islice(self._method.steps(problem, tangent, start), 1, MOST_STEPS + 1):
+            u = step.state.copy()
+            if not np.isfinite(u).all():
+                break
+            correction = np.linalg.norm(u - last) / float(step.notes.get("length", 1.0))
+            arrives = correction <= SMALL * np.linalg.norm(u - start)
+            if arrives and np.linalg.norm(flow.residual(u)) <= SMALL * forces:
+                assert isinstance(tangent.factors, Preconditioned)
+                self._factors = tangent.factors.factors
+                return u
+            last = u
+        why = f"Newton does not solve the flow in {MOST_STEPS} steps with twice the nodes"
+        raise SolveError(Status.BUDGET_SPENT, why)

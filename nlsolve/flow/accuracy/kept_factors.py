@@ -1,4 +1,4 @@
-"""A x = b by GMRES over Krylov spaces of A K⁻¹, with the factors K of an earlier matrix."""
+"""A x = b by GMRES over Krylov spaces of A K⁻¹, K⁻¹ the factors of an earlier matrix or those of a coarser cloud."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ import numpy as np
 import scipy
 
 from nlsolve.contracts.linear_solver import Factors, LinearSolver
+from nlsolve.flow.accuracy.two_grids import TwoGrids
 from nlsolve.series import Array
 
 ACCURATE = 1e-2
@@ -21,7 +22,8 @@ DIMENSION = 20
 
 
 class KeptFactors(LinearSolver):
-    """Factorises the first matrix of a solve, and a later one only where GMRES fails with the factors so far.
+    """Factorises the first matrix of a solve, and a later one only where GMRES fails with the factors so far; none,
+    as long as it does not fail, where the tangent on a coarser cloud has been factorised.
 
     For a few Newton steps that need not be exact, on a matrix too large to be factorised at each (Saad & Schultz 1986,
     preconditioned on the right, so that what GMRES tests is the true residual).
@@ -29,15 +31,18 @@ class KeptFactors(LinearSolver):
 
     kind: Literal["kept-factors"] = "kept-factors"
     linear: Any
+    coarser: Any = None
 
     def factorize(self, matrix: Any, previous: Factors | None = None) -> Preconditioned:
         """The matrix with its own factors, or with those that `previous` has."""
-        earlier = previous if isinstance(previous, Preconditioned) else None
-        return Preconditioned(matrix, self.linear, None if earlier is None else earlier.factors)
+        earlier = previous.factors if isinstance(previous, Preconditioned) else None
+        if self.coarser is not None and (earlier is None or isinstance(earlier, TwoGrids)):
+            earlier = TwoGrids(matrix, self.coarser)
+        return Preconditioned(matrix, self.linear, earlier)
 
 
 class Preconditioned(Factors):
-    """A matrix (U, U), and the factors of it or of an earlier one.
+    """A matrix (U, U), and the factors of it, of an earlier one, or two grids.
 
     factors : those that precondition the next solve.
     """
