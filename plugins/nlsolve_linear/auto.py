@@ -9,7 +9,7 @@ from nlsolve_linear.pardiso import Pardiso
 from nlsolve_linear.rslab import Rslab
 from nlsolve_linear.superlu import SuperLU
 
-SMALL = 1000
+SMALL = 400
 """Unknowns up to which SuperLU serves."""
 
 FASTEST: tuple[type[LinearSolver], ...] = (Pardiso, Rslab, SuperLU)
