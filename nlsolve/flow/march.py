@@ -15,7 +15,7 @@ from nlsolve.contracts.problem import NonlinearProblem
 from nlsolve.contracts.scene import Entry, Simulation, Solve, Workload
 from nlsolve.contracts.status import SolveError, Status
 from nlsolve.flow.accuracy.adaptation import Adaptation
-from nlsolve.flow.accuracy.enrichment import carried
+from nlsolve.flow.accuracy.enrichment import interpolation
 from nlsolve.flow.accuracy.estimate import NOTHING_TO_COMPARE, Comparison, compared
 from nlsolve.flow.claims.units import SMALL, WAY_OUT
 from nlsolve.flow.continuation import REST, Solves, Stage
@@ -106,7 +106,9 @@ class FlowSimulation(Simulation):
         if self.parts.start.stored is not None:
             nodes, velocity = self.parts.start.stored.velocity()
             moved = nodes.shape != cloud.nodes.shape or not np.allclose(nodes, cloud.nodes)
-            self.state.guess = self.state.velocity = carried(Cloud(nodes, {}), cloud)(velocity) if moved else velocity
+            if moved:
+                velocity = interpolation(Cloud(nodes, {}), cloud.nodes) @ velocity
+            self.state.guess = self.state.velocity = velocity
 
     def settle(self, cloud: Cloud) -> None:
         """Take `cloud` as that of t = 0, and find the node of the probe."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from copy import copy
 from typing import Any, Protocol
 
@@ -93,12 +92,12 @@ class FlowState:
         self.velocity = self.guess = np.zeros_like(self.cloud.nodes)
         self.flow = None
 
-    def carry_to(self, cloud: Cloud, carry: Callable[[Array], Array]) -> None:
+    def carry_to(self, cloud: Cloud, carry: Any) -> None:
         """Go on with other nodes at the same time; velocity and pressure are carried there. May raise SolveError.
 
-        carry : values at the present nodes (N, 2) -> values at those of `cloud`.
+        carry : sparse (M, N), values at the present nodes -> values at those of `cloud`.
         """
-        self.velocity = self.guess = carry(self.velocity)
+        self.velocity = self.guess = carry @ self.velocity
         self.cloud = cloud
         self.build_operators()
 

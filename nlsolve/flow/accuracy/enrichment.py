@@ -4,9 +4,8 @@ those that a discretizer adds.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 import scipy
@@ -24,51 +23,29 @@ BEYOND = 1.0
 """How far outside of its triangle a point may be, as a barycentric coordinate, for values to go on linearly there."""
 
 
-class Finer(Protocol):
-    """A cloud whose first N nodes are those of a coarser one."""
-
-    @property
-    def cloud(self) -> Cloud:
-        """The cloud, M nodes."""
-
-    def carry(self, values: Array, /) -> Array:
-        """Values at the coarser cloud's nodes (N, …) -> at all nodes (M, …)."""
-
-
 @dataclass(frozen=True)
-class Completed:
-    """A cloud to which a discretizer has added nodes of its own."""
+class Finer:
+    """A cloud (M nodes) whose first N nodes are those of a coarser one.
 
-    cloud: Cloud
-    coarser: Cloud
-
-    def carry(self, values: Array) -> Array:
-        """Linear between the coarser cloud's nodes."""
-        return carried(self.coarser, self.cloud)(values)
-
-
-@dataclass(frozen=True)
-class Enriched:
-    """A cloud (N + E nodes) whose first N nodes are those of a coarser one.
-
-    ends : the nodes between which each further node was put, (E, 2).
+    weights : sparse (M, N), values at the coarser cloud's nodes -> at all nodes.
     """
 
     cloud: Cloud
-    ends: Indices
+    coarser: Cloud
+    weights: Any
 
     def carry(self, values: Array) -> Array:
-        """Values at the coarser cloud's nodes (N, …) -> at all nodes (N + E, …): means of both ends."""
-        return np.concatenate([values, values[self.ends].mean(axis=1)])
+        """Values at the coarser cloud's nodes, (N,) or (N, 2) -> at all nodes: linear in between."""
+        carried: Array = self.weights @ values
+        return carried
 
-    def interpolation(self, coarser: Cloud) -> Any:
-        """`carry` of velocities that are zero on the boundary, (2F, 2 F_c): from the unknowns of the `coarser` cloud
-        to those of this one, of each node side by side.
+    @property
+    def interpolation(self) -> Any:
+        """`weights` for velocities that are zero on the boundary, sparse (2F, 2 F_c): from the unknowns of the coarser
+        cloud to those of this one, those of a node side by side.
         """
-        count, added = len(coarser.nodes), len(self.ends)
-        means = sp.csr_array((np.full(2 * added, 0.5), self.ends.ravel(), 2 * np.arange(added + 1)), (added, count))
-        carry = sp.vstack([sp.eye_array(count), means], format="csr")
-        return sp.kron(carry[self.cloud.interior][:, coarser.interior], sp.eye_array(2), format="csr")
+        inside = self.weights[self.cloud.interior][:, self.coarser.interior]
+        return sp.kron(inside, sp.eye_array(2), format="csr")
 
 
 def inner_edges(cloud: Cloud) -> Indices:
@@ -77,14 +54,18 @@ def inner_edges(cloud: Cloud) -> Indices:
     return edges[~cloud.on_boundary[edges].all(axis=1)]
 
 
-def enriched(cloud: Cloud, edges: Indices) -> Enriched:
-    """The cloud with a node in the middle of each of these edges (E, 2); the cloud itself without any."""
-    if not len(edges):
-        return Enriched(cloud, edges)
-    return _with_nodes(cloud, edges, cloud.nodes[edges].mean(axis=1), cloud.boundaries)
+def the_same(cloud: Cloud) -> Finer:
+    """The cloud without further nodes."""
+    return Finer(cloud, cloud, sp.eye_array(len(cloud.nodes), format="csr"))
 
 
-def twice_as_fine(cloud: Cloud) -> Enriched:
+def completed(cloud: Cloud, coarser: Cloud) -> Finer:
+    """A `cloud` whose first nodes are those of a `coarser` one."""
+    added = interpolation(coarser, cloud.nodes[len(coarser.nodes) :])
+    return Finer(cloud, coarser, _after_its_own(added))
+
+
+def twice_as_fine(cloud: Cloud) -> Finer:
     """The cloud with a node in the middle of each edge inside and at walls: about four times as many."""
     within, walls = inner_edges(cloud), wall_edges(cloud, cloud.triangulation)
     both_in = [np.isin(walls[:, 1:3], group).all(axis=1) for group in cloud.boundaries.values()]
@@ -94,42 +75,43 @@ def twice_as_fine(cloud: Cloud) -> Enriched:
         name: np.concatenate([group, numbers[both & named]])
         for (name, group), both in zip(cloud.boundaries.items(), both_in, strict=True)
     }
+    edges = np.concatenate([within, walls[named, 1:3]])
     places = np.concatenate([cloud.nodes[within].mean(axis=1), middles(cloud.nodes, walls[named])])
-    return _with_nodes(cloud, np.concatenate([within, walls[named, 1:3]]), places, groups)
+    nodes, triangles = np.concatenate([cloud.nodes, places]), subdivided(cloud.triangulation, edges, len(cloud.nodes))
+    means = sp.coo_array((np.full(edges.size, 0.5), (np.arange(edges.size) // 2, edges.ravel())))
+    means.resize(len(edges), len(cloud.nodes))
+    return Finer(Cloud(nodes, groups, triangles_before=triangles), cloud, _after_its_own(means))
 
 
-def _with_nodes(cloud: Cloud, edges: Indices, places: Array, boundaries: Mapping[str, Indices]) -> Enriched:
-    """The cloud with a node at each of `places` (E, 2) near the middle of `edges` (E, 2)."""
-    triangles = subdivided(cloud.triangulation, edges, len(cloud.nodes))
-    nodes = np.concatenate([cloud.nodes, places])
-    return Enriched(Cloud(nodes, boundaries, triangles_before=triangles), edges)
+def _after_its_own(added: Any) -> Any:
+    """A cloud's weights (E, N) of further nodes below those of its own."""
+    return sp.vstack([sp.eye_array(added.shape[1]), added], format="csr")
 
 
-def carried(here: Cloud, there: Cloud) -> Callable[[Array], Array]:
-    """Values (N, …) at the nodes `here` -> at the nodes `there`: linear on the triangles and a little beyond them, and
-    further away those of the nearest node.
+def interpolation(cloud: Cloud, points: Array) -> Any:
+    """Sparse (P, N), values at the nodes of a cloud -> at points (P, 2): linear on the triangles and a little beyond
+    them, and further away those of the nearest node.
     """
-    corners = here.triangulation[~on_one_wall(here.walls[here.triangulation.T])]
-    tree = scipy.spatial.cKDTree(here.nodes[corners].mean(axis=1))
-    places, shares = _shares(here, corners, tree, there.nodes, FEW)
+    corners = cloud.triangulation[~on_one_wall(cloud.walls[cloud.triangulation.T])]
+    tree = scipy.spatial.cKDTree(cloud.nodes[corners].mean(axis=1))
+    places, shares = _shares(cloud, corners, tree, points, FEW)
     far = np.flatnonzero(shares.min(axis=1) < 0.0)
-    places[far], shares[far] = _shares(here, corners, tree, there.nodes[far], MANY)
+    places[far], shares[far] = _shares(cloud, corners, tree, points[far], MANY)
     away = np.flatnonzero(shares.min(axis=1) < -BEYOND)
-    places[away] = here.tree.query(there.nodes[away])[1][:, None]
+    places[away] = cloud.tree.query(points[away])[1][:, None]
     shares[away] = 1.0 / 3.0
-    rows = np.repeat(np.arange(len(there.nodes)), 3)
-    weights = sp.csr_array((shares.ravel(), (rows, places.ravel())), shape=(len(there.nodes), len(here.nodes)))
-    return lambda values: weights @ values
+    rows = np.repeat(np.arange(len(points)), 3)
+    return sp.csr_array((shares.ravel(), (rows, places.ravel())), shape=(len(points), len(cloud.nodes)))
 
 
-def _shares(here: Cloud, corners: Indices, tree: Any, points: Array, count: int) -> tuple[Indices, Array]:
+def _shares(cloud: Cloud, corners: Indices, tree: Any, points: Array, count: int) -> tuple[Indices, Array]:
     """Of the triangles with the `count` nearest centroids that in which the least barycentric coordinate of a point is
     largest, so that it holds the point if one does: corners and coordinates, (P, 3).
 
     tree : of the centroids of the triangles with these `corners` (T, 3).
     """
     _, near = tree.query(points, np.arange(1, min(count, len(corners)) + 1))
-    x, y = np.moveaxis(here.nodes[corners[near]] - points[:, None, None], 3, 0)  # (P, count, 3)
+    x, y = np.moveaxis(cloud.nodes[corners[near]] - points[:, None, None], 3, 0)  # (P, count, 3)
     areas = np.stack([x[..., k - 2] * y[..., k - 1] - x[..., k - 1] * y[..., k - 2] for k in range(3)], axis=2)
     with np.errstate(divide="ignore", invalid="ignore"):
         shares = np.nan_to_num(areas / areas.sum(axis=2, keepdims=True), nan=-np.inf)  # of slivers

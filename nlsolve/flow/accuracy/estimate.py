@@ -11,10 +11,10 @@ compressibility is a small part of what it was: V* − V has the error of the pe
 Fortin & Glowinski 1983).
 
 Newton's steps, two with each tangent, end when a correction is small beside the way gone. The tangent of V_fine is
-solved by cycles with the factors of that of V_coarse (`two_grids`); beside a penalty, and where these fail, its steps
-all take the factors of the first one (`kept_factors`). Where the flow has a potential it falls at each step (`energy`):
-at n = 0.05 a residual made to fall instead cuts the steps so short that they end far from the solution. None of this is
-counted with the work of the method.
+solved by cycles with the factors of that of V_coarse, or of linear triangles on the cloud itself (`two_grids`); beside
+a penalty, and where cycles fail, its steps all take the factors of the first one (`kept_factors`). Where the flow has a
+potential it falls at each step (`energy`): at n = 0.05 a residual made to fall instead cuts the steps so short that
+they end far from the solution. None of this is counted with the work of the method.
 """
 
 from __future__ import annotations
@@ -30,9 +30,10 @@ from nlsolve.contracts.continuum.discretizer import Discretizer
 from nlsolve.contracts.linear_solver import Factors, LinearSolver
 from nlsolve.contracts.rules.refresh import RefreshRule
 from nlsolve.contracts.status import SolveError, Status
-from nlsolve.flow.accuracy.enrichment import Completed, Enriched, Finer, enriched, twice_as_fine
+from nlsolve.flow.accuracy.enrichment import Finer, completed, the_same, twice_as_fine
 from nlsolve.flow.accuracy.kept_factors import KeptFactors, Preconditioned
 from nlsolve.flow.accuracy.two_grids import Coarser
+from nlsolve.flow.linear_triangles import linear_triangles
 from nlsolve.flow.state import FlowState
 from nlsolve.registry.nested import AnyRefresh
 from nlsolve.series import Array
@@ -92,19 +93,18 @@ def compared(state: FlowState, velocity: Array, before: Array | None) -> Compari
     if estimator is None:
         return NOTHING_TO_COMPARE
 
-    def begun(finer: Finer) -> _Enriched:
-        return _Enriched(state, finer, estimator, velocity, before, work)
+    def begun(discretizer: Discretizer, finer: Finer) -> _Enriched:
+        return _Enriched(state, finer, discretizer, velocity, before, work)
 
     here = state.cloud
-    completed = estimator.completed(here)
-    if len(completed.nodes) > len(here.nodes):
-        best = begun(Completed(completed, here)).velocity()[: len(velocity)]
+    complete = estimator.completed(here)
+    if len(complete.nodes) > len(here.nodes):
+        fine = begun(estimator, completed(complete, here))
+        best = fine.velocity(begun(linear_triangles(), the_same(here)) if fine.takes_cycles else None)
     else:
-        same, finer = enriched(here, np.empty((0, 2), dtype=int)), twice_as_fine(here)
-        coarse = begun(same)
-        coarser = coarse.velocity()
-        fine = begun(finer).velocity(coarse.below(finer))[: len(velocity)]
-        best = fine + RICHARDSON * (fine - coarser)
+        coarse, fine = begun(estimator, the_same(here)), begun(estimator, twice_as_fine(here))
+        coarser, finer = coarse.velocity(), fine.velocity(coarse)
+        best = finer + RICHARDSON * (finer - coarser)
     error = (best - velocity)[inside]
     return Comparison(
         float(np.linalg.norm(error) / np.linalg.norm(best[inside])),
@@ -126,7 +126,7 @@ class _Counted:
 
 
 class _Enriched:
-    """The flow of `state` on an enriched cloud, and the factors of the tangent with which it was solved last."""
+    """The flow of `state` on a cloud whose first nodes are its own, to be solved."""
 
     def __init__(
         self,
@@ -139,30 +139,35 @@ class _Enriched:
     ) -> None:
         there = state.enriched(finer, discretizer, velocity)
         inertia = there.inertia_from(None if before is None else finer.carry(before))
-        self.flow = there.flow_of(state.parts.law, inertia)
-        self._start = self.flow.unknowns(there.velocity)
-        self._method = state.parts.start.method(self.flow)
+        self._finer, self._flow = finer, there.flow_of(state.parts.law, inertia)
+        self._start = self._flow.unknowns(there.velocity)
+        self._method = state.parts.start.method(self._flow)
         self._linear = _Counted(state.parts.linear.for_one_matrix(), work)
         self._factors: Factors | None = None
 
-    def velocity(self, coarser: Coarser | None = None) -> Array:
-        """V, first of the nodes of `state`: R(u) = 0 to the accuracy that an estimate needs. Raises SolveError.
-
-        coarser : the tangent on the cloud that this one refines, if it serves here.
+    @property
+    def takes_cycles(self) -> bool:
+        """Whether two grids solve with a tangent: not where it is no gradient, and not beside a penalty, which couples
+        motions that differ from node to node.
         """
-        return self.flow.velocity(self._solved(coarser))
+        return self._flow.is_gradient and self._flow.pressure(self._start) is None
 
-    def below(self, finer: Enriched) -> Coarser | None:
-        """The tangent here for a flow on twice as fine triangles. None where two grids do not solve that: where it is
-        no gradient, or where the penalty holds motions together that differ from node to node.
+    def velocity(self, coarse: _Enriched | None = None) -> Array:
+        """V at the nodes of `state`: R(u) = 0 to the accuracy that an estimate needs. Raises SolveError.
+
+        coarse : the flow on fewer of these nodes, if there is one.
         """
-        if not self.flow.is_gradient or self.flow.pressure(self._start) is not None:
-            return None
-        factors = self._factors or self._linear.factorize(self.flow.jacobian(self._start))
-        return Coarser(factors, finer.interpolation(self.flow.cloud))
+        coarser = None
+        if coarse is not None and self.takes_cycles:
+            coarser = Coarser(coarse.factors(), self._finer.interpolation)
+        return self._flow.velocity(self._solved(coarser))[: len(self._finer.coarser.nodes)]
+
+    def factors(self) -> Factors:
+        """Of the tangent with which the flow was solved last, or of that at the start. Raises SolveError."""
+        return self._factors or self._linear.factorize(self._flow.jacobian(self._start))
 
     def _solved(self, coarser: Coarser | None) -> Array:
-        flow, start = self.flow, self._start
+        flow, start = self._flow, self._start
         linear = KeptFactors(linear=self._linear, coarser=coarser)
         rule = RENEWED.validate_python({"kind": "every-m", "m": STEPS_WITH_EACH})
         problem, tangent = CountedProblem(flow, Ledger()), Tangent(linear, rule, Ledger())

@@ -11,7 +11,7 @@ from nlsolve.contracts.linear_solver import Factors, LinearSolver
 from nlsolve.flow.accuracy.two_grids import TwoGrids
 from nlsolve.series import Array
 
-ACCURATE = 1e-2
+ACCURATE = 1e-3
 """‖b − A x‖/‖b‖ that GMRES is asked for."""
 
 POOR = 0.1

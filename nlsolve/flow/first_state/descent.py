@@ -16,19 +16,19 @@ from collections.abc import Generator, Sequence
 import numpy as np
 from pydantic import TypeAdapter
 
-from nlsolve.contracts.continuum.discretizer import Discretizer
 from nlsolve.contracts.continuum.law import ConstitutiveLaw
 from nlsolve.contracts.nonlinear_solver import NonlinearSolver
 from nlsolve.contracts.outcome import Outcome
 from nlsolve.contracts.rules.refresh import RefreshRule
 from nlsolve.contracts.scene import Preparation, Solve
 from nlsolve.contracts.status import SolveError, Status
-from nlsolve.flow.accuracy.enrichment import carried
+from nlsolve.flow.accuracy.enrichment import interpolation
 from nlsolve.flow.continuation import Solves, Stage
 from nlsolve.flow.first_state.thinning import thinned
+from nlsolve.flow.linear_triangles import linear_triangles
 from nlsolve.flow.momentum import Flow
 from nlsolve.flow.state import FlowParts, FlowState
-from nlsolve.registry.nested import AnyDiscretizer, AnyRefresh, AnySolver
+from nlsolve.registry.nested import AnyRefresh, AnySolver
 from nlsolve.series import Array
 
 TOLERANCES = (1e-2, 1e-6)
@@ -43,10 +43,9 @@ MANY = 4000
 MOST = 60
 """Iterations of one solve, after which this way is given up for the continuation."""
 
-TRIANGLES: TypeAdapter[Discretizer] = TypeAdapter(AnyDiscretizer)
 METHOD: TypeAdapter[NonlinearSolver] = TypeAdapter(AnySolver)
 RULE: TypeAdapter[RefreshRule] = TypeAdapter(AnyRefresh)
-"""They look up the discretizer, the method and its rule when a way begins: plugins may still be being imported now."""
+"""They look up the method and its rule when a way begins: plugins may still be being imported now."""
 
 
 def may_descend(parts: FlowParts, stages: list[Stage]) -> bool:
@@ -85,12 +84,12 @@ def first_guess(state: FlowState, law: ConstitutiveLaw) -> Generator[Solve, Outc
     try:
         with state.entry("operators"):
             fewer = thinned(state.cloud)
-            carry = carried(fewer, state.cloud)
+            carry = interpolation(fewer, state.cloud.nodes)
         there = state.at_rest_on(fewer, linear_triangles())
     except SolveError:  # where fewer nodes carry no triangles, all of them begin at rest
         return rest
     outcome = yield from descent(there, law, TOLERANCES_ON_FEWER)
-    return carry(there.guess) if outcome.status is Status.CONVERGED else rest
+    return carry @ there.guess if outcome.status is Status.CONVERGED else rest
 
 
 def most_iterations(state: FlowState) -> int:
@@ -106,11 +105,6 @@ def by_triangles(state: FlowState, law: ConstitutiveLaw) -> Flow:
 def is_by_triangles(state: FlowState) -> bool:
     """Whether linear triangles are the discretizer of the case."""
     return state.discretizer == linear_triangles()
-
-
-def linear_triangles() -> Discretizer:
-    """The discretizer of the descent."""
-    return TRIANGLES.validate_python({"kind": "delaunay"})
 
 
 def arrival(state: FlowState, law: ConstitutiveLaw, most: int) -> Solves:

@@ -10,7 +10,7 @@ from nlsolve.contracts.outcome import Outcome
 from nlsolve.contracts.scene import Solve
 from nlsolve.contracts.status import SolveError, Status
 from nlsolve.flow.accuracy.adaptation import Adaptation
-from nlsolve.flow.accuracy.enrichment import carried
+from nlsolve.flow.accuracy.enrichment import interpolation
 from nlsolve.flow.accuracy.estimate import UNKNOWN, compared
 from nlsolve.flow.continuation import Solves, Stage, walk
 from nlsolve.flow.first_state.descent import (
@@ -148,7 +148,7 @@ class FirstState:
         here = state.cloud
         with state.entry("operators"):
             cloud = adaptation.cloud(state.parts.scene, state.discretizer, here, state.velocity, count)
-            carry = carried(here, cloud)
+            carry = interpolation(here, cloud.nodes)
         adaptation.rounds += 1
         state.carry_to(cloud, carry)
         self.settle(cloud)

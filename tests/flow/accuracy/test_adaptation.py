@@ -13,8 +13,8 @@ from nlsolve_scenes import Cavity, Channel, Couette, EccentricCylinders, Manufac
 from pydantic import ValidationError
 
 from nlsolve.contracts.scene import Misfit, Simulation
-from nlsolve.flow import march as marching
 from nlsolve.flow.continuation import Start
+from nlsolve.flow.first_state import first_state
 from nlsolve.plugin import AdaptiveNodes, FlowScene, Physics, TimeSteps
 from nlsolve.series import Array
 from nlsolve.solving.simulate import run_case
@@ -112,10 +112,10 @@ def test_an_error_out_of_reach_of_the_limits_is_told_in_a_sentence(limits: dict[
 
 
 def test_a_state_that_cannot_be_carried_is_reached_by_continuation_again(monkeypatch: pytest.MonkeyPatch) -> None:
-    def lost(here: Any, there: Any) -> Any:
-        return lambda values: np.full_like(there.nodes, np.nan)
+    def lost(cloud: Any, points: Any) -> Any:
+        return np.full((len(points), len(cloud.nodes)), np.nan)
 
-    monkeypatch.setattr(marching, "carried", lost)
+    monkeypatch.setattr(first_state, "interpolation", lost)
     row, _, _ = solved(case(SPIN, 0.3))
     assert row["status"] == "converged", row["message"]
     assert row["velocity_error_inside"] <= 0.02

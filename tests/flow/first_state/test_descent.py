@@ -251,7 +251,7 @@ def test_nodes_without_triangles_lead_to_the_continuation(monkeypatch: pytest.Mo
         def operators(self, cloud: Cloud, volumetric: bool) -> Operators:
             raise SolveError(Status.BAD_CLOUD, "all nodes lie on one line")
 
-    monkeypatch.setattr(descending.TRIANGLES, "validate_python", lambda table: Refusing())
+    monkeypatch.setattr(descending, "linear_triangles", Refusing)
     assert_continued(case(), wasted=0)
 
 
