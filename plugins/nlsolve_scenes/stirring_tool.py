@@ -76,10 +76,12 @@ class StirringTool(FlowScene):
 
         n is the local index of the law at that rate, ε̄ = γ̇/√3, found by iteration.
         """
-        n = 1.0
+        n, before = 1.0, np.nan
         for _ in range(30):
+            if n == before:
+                break
             rate = (2.0 / n if self.motion == "spin" else 1.0 / n**2) * self.angular_speed / np.sqrt(3.0)
-            n = max(local_index(law, rate), THINNEST)
+            n, before = max(local_index(law, rate), THINNEST), n
         layer = self.tool_radius * (0.5 * n if self.motion == "spin" else n**2)
         return min(layer, 0.25 * (self.plate_radius - self.tool_radius))
 
