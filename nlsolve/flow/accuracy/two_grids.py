@@ -28,6 +28,10 @@ SMOOTHED = 4.0
 SWEEPS = 2
 """Sweeps before and after each correction."""
 
+ANGLES = np.pi * (np.arange(SWEEPS) + 0.5) / SWEEPS
+ZEROS = 0.5 * LARGEST * (1.0 + 1.0 / SMOOTHED + (1.0 - 1.0 / SMOOTHED) * np.cos(ANGLES))
+"""1/ω: the zeros of Chebyshev's polynomial between those eigenvalues."""
+
 
 @dataclass(frozen=True)
 class Coarser:
@@ -55,14 +59,16 @@ class TwoGrids(Factors):
 
     def solve(self, rhs: Array) -> Array:
         """x (2F,) near A⁻¹ rhs."""
-        x = self._swept(np.zeros_like(rhs), rhs)
-        left = self._coarser.interpolation.T @ (rhs - self._matrix @ x)
-        return self._swept(x + self._coarser.interpolation @ self._coarser.factors.solve(left), rhs)
+        x = self._swept(rhs)
+        slow = self._coarser.interpolation.T @ (rhs - self._matrix @ x)
+        x = x + self._coarser.interpolation @ self._coarser.factors.solve(slow)
+        return x + self._swept(rhs - self._matrix @ x)
 
-    def _swept(self, x: Array, rhs: Array) -> Array:
-        """1/ω of the sweeps are the zeros of Chebyshev's polynomial between the eigenvalues that they take away."""
-        middle, half = LARGEST * (1.0 + 1.0 / SMOOTHED) / 2.0, LARGEST * (1.0 - 1.0 / SMOOTHED) / 2.0
-        for zero in middle + half * np.cos(np.pi * (np.arange(SWEEPS) + 0.5) / SWEEPS):
+    def _swept(self, rhs: Array) -> Array:
+        """The sweeps from x = 0."""
+        first, *others = ZEROS
+        x: Array = self._inverses @ rhs / first
+        for zero in others:
             x = x + self._inverses @ (rhs - self._matrix @ x) / zero
         return x
 
