@@ -7,11 +7,15 @@ from typing import Literal, Self
 import numpy as np
 from pydantic import Field, model_validator
 
-from nlsolve.plugin import Cloud, SolveError, Status
+from nlsolve.plugin import Cloud, ConstitutiveLaw, SolveError, Status
 from nlsolve_discretizers.collocation import Collocation, least_count
 from nlsolve_discretizers.weights.least_squares import Derivatives, fit
 from nlsolve_discretizers.weights.lists import Lists
 from nlsolve_discretizers.weights.supports import Supports
+
+SUPPORTS = ("support", "force_support", "volume_support")
+AMPLE = 1.5
+"""Points of a support over the coefficients of its polynomial with which flows were solved at degrees 2 and 3."""
 
 SMALLEST_PIVOT = 1e-8  # of R, relative to its column: below, the support does not determine the polynomial
 
@@ -33,12 +37,23 @@ class MovingLeastSquares(Collocation):
     @model_validator(mode="after")
     def _enough_neighbours(self) -> Self:
         least = least_count(self.degree)
-        for name in ("support", "force_support", "volume_support"):
+        for name in SUPPORTS:
             if self.radius is None and getattr(self, name) < least:
                 raise ValueError(
                     f"{name} = {getattr(self, name)}: polynomials of degree {self.degree} need at least {least} points"
                 )
         return self
+
+    def advice(self, law: ConstitutiveLaw, rate: float) -> str:
+        """To take larger supports, where they have hardly more points than their polynomials have coefficients."""
+        least = least_count(self.degree)
+        few = [f"{name} = {getattr(self, name)}" for name in SUPPORTS if getattr(self, name) < AMPLE * least]
+        if self.radius is not None or not few:
+            return ""
+        return (
+            f"discretizer.{' and '.join(few)}: few points for polynomials of degree {self.degree}, which have {least} "
+            f"coefficients: give at least {AMPLE * least:.0f}, or lower discretizer.degree"
+        )
 
     def neighbour_count(self, role: str) -> int | None:
         """The counts of the roles, unless a radius is given; values have as many neighbours as strains."""

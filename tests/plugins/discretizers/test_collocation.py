@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from cases import setup
 from clouds import CLOUDS, jittered_points, power
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -15,7 +16,8 @@ from nlsolve_discretizers.collocation import GRADIENT, Collocation
 from nlsolve_discretizers.weights.least_squares import monomials, weight_function
 from nlsolve_discretizers.weights.supports import Supports
 from nlsolve_laws import PowerLaw
-from nlsolve_scenes import Channel
+from nlsolve_scenes import Channel, StirringTool
+from nlsolve_scenes.nodes.rings import Rings
 from pydantic import ValidationError
 from scipy.spatial import cKDTree
 
@@ -24,6 +26,7 @@ from nlsolve.contracts.continuum.cloud import node_major
 from nlsolve.plugin import Cloud, Discretizer, Operators
 from nlsolve.results.columns import DIAGNOSTICS
 from nlsolve.series import Array
+from nlsolve.solving.simulate import run_case
 from nlsolve.testing import check_discretizer
 
 SUPPORT = {1: 8, 2: 15, 3: 24, 4: 34}  # of a degree, for least squares
@@ -411,3 +414,26 @@ def test_supports_smaller_than_the_polynomial_are_refused_at_once() -> None:
         MovingLeastSquares(degree=3, force_support=9, support=12)
     with pytest.raises(ValidationError, match="support = 9: polynomials of degree 3 need at least 10 points"):
         RadialBasis(degree=3, support=9)
+
+
+def test_a_flow_that_is_not_solved_on_small_supports_is_told_of_them() -> None:
+    scene = StirringTool(nodes=Rings(spacing=0.5))
+    row = run_case(setup(scene, 0.1324, discretizer=MovingLeastSquares(balanced=False, degree=3))).summary
+    assert row["status"] != "converged"
+    advice = (
+        "discretizer.support = 10 and force_support = 12: few points for polynomials of degree 3, which have 10 "
+        "coefficients: give at least 15, or lower discretizer.degree"
+    )
+    assert advice in row["message"]
+
+
+def test_the_advice_names_the_supports_that_are_small() -> None:
+    advice = MovingLeastSquares(support=6).advice(PowerLaw(), 100.0)
+    assert advice.startswith("discretizer.support = 6: few points for polynomials of degree 2, which have 6")
+
+
+@pytest.mark.parametrize(
+    "ample", [{}, {"degree": 1}, {"degree": 3, "support": 15, "force_support": 15}, {"radius": 1.0}]
+)
+def test_there_is_no_advice_where_supports_are_ample(ample: dict[str, Any]) -> None:
+    assert not MovingLeastSquares(**ample).advice(PowerLaw(), 100.0)
