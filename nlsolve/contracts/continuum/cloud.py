@@ -37,7 +37,7 @@ class Cloud:
         if not np.isfinite(self.nodes).all():
             bad = int(np.flatnonzero(~np.isfinite(self.nodes).all(axis=1))[0])
             raise SolveError(Status.BAD_CLOUD, f"node {bad} has a coordinate that is not a finite number")
-        spread = float(np.ptp(self.nodes, axis=0).max())
+        spread = max(float(np.ptp(x)) for x in self.nodes.T)
         nearest = self.nearest_distance
         first = int(nearest.argmin())
         if not nearest[first] > 1e-9 * spread:

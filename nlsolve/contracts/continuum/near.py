@@ -77,11 +77,14 @@ def largest_near(places: Array, values: Array, targets: Array, within: float) ->
     if not side > 0.0:
         return np.full(len(targets), values.max(initial=0.0))
 
-    def cell(x: Array, y: Array) -> tuple[Indices, Indices]:
-        return ((x - west) / side).astype(np.intp), ((y - south) / side).astype(np.intp)
+    columns, rows = int(width / side) + 3, int(height / side) + 3  # of cells, with empty ones on either side
 
-    cells = np.zeros((int(width / side) + 3, int(height / side) + 3))  # an empty row and column on either side
-    np.maximum.at(cells[1:-1, 1:-1], cell(x, y), values)
-    rows = np.maximum(np.maximum(cells[:-2], cells[1:-1]), cells[2:])
-    blocks: Array = np.maximum(np.maximum(rows[:, :-2], rows[:, 1:-1]), rows[:, 2:])[cell(at_x, at_y)]
-    return blocks
+    def cell(x: Array, y: Array) -> Indices:
+        number: Indices = ((x - west) / side).astype(np.intp) * rows + ((y - south) / side).astype(np.intp)
+        return number
+
+    cells = np.zeros(columns * rows)
+    np.maximum.at(cells[rows + 1 :], cell(x, y), values)
+    of_three = np.maximum(np.maximum(cells[: -2 * rows], cells[rows:-rows]), cells[2 * rows :])
+    of_nine: Array = np.maximum(np.maximum(of_three[:-2], of_three[1:-1]), of_three[2:])
+    return of_nine[cell(at_x, at_y)]
