@@ -122,5 +122,5 @@ def hat_gradients(nodes: Array, corners: Indices) -> Array:
     nodes : (N, 2) [mm].
     corners : (T, 3), counter-clockwise.
     """
-    ahead, behind = nodes[corners[:, [1, 2, 0]]], nodes[corners[:, [2, 0, 1]]]
-    return 0.5 * np.stack([ahead[..., 1] - behind[..., 1], behind[..., 0] - ahead[..., 0]], axis=-1)
+    (x, y), ahead, behind = np.ascontiguousarray(nodes.T), corners[:, [1, 2, 0]], corners[:, [2, 0, 1]]
+    return 0.5 * np.stack([y[ahead] - y[behind], x[behind] - x[ahead]], axis=-1)

@@ -38,7 +38,7 @@ def ordered(corners: Indices) -> Indices:
         [np.where(from_a, x, np.where(from_b, y, z)) for x, y, z in ((a, b, c), (b, c, a), (c, a, b))], axis=1
     )
     a, b, c = turned.T
-    return turned[np.argsort((a * count + b) * count + c)]
+    return turned[in_order((a * count + b) * count + c)[0]]
 
 
 def edges_of(corners: Indices) -> Indices:

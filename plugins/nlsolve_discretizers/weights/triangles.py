@@ -57,7 +57,7 @@ class Triangles:
 
     @classmethod
     def _of(cls, cloud: Cloud, whole: np.ndarray) -> Triangles:
-        triangles = cls(cloud, whole[~on_one_wall(cloud.walls[whole.T])], whole)
+        triangles = cls(cloud, whole[~on_one_wall(cloud.walls[np.ascontiguousarray(whole.T)])], whole)
         if np.bincount(triangles.corners.ravel(), minlength=len(cloud.nodes))[cloud.interior].min(initial=1) == 0:
             raise SolveError(Status.BAD_CLOUD, "a node belongs to no triangle of the cloud: it coincides with another")
         return triangles
@@ -93,7 +93,7 @@ class Triangles:
     def inner_edges(self) -> np.ndarray:
         """The edges that have an end inside, (M, 2)."""
         ends, _ = self.edges
-        one, other = self.cloud.on_boundary[ends.T]
+        one, other = self.cloud.on_boundary[np.ascontiguousarray(ends.T)]
         return ends[~(one & other)]
 
     def midpoints(self) -> np.ndarray:
@@ -114,36 +114,39 @@ class Triangles:
         """
         ends, beside = self.edges
         inner = np.flatnonzero(beside[:, 1] >= 0)
-        sides = beside[inner]
-        length = np.linalg.norm(self.cloud.nodes[ends[inner, 0]] - self.cloud.nodes[ends[inner, 1]], axis=1)
-        merit = np.round(length / np.sqrt(_means(self.areas, sides)), 6)
+        (x, y), (one, other) = np.ascontiguousarray(self.cloud.nodes.T), ends[inner].T
+        dx, dy = x[one] - x[other], y[one] - y[other]
+        sides = inner_sides = np.ascontiguousarray(beside[inner].T)
+        merit = np.sqrt(dx * dx + dy * dy) / np.sqrt(_means(self.areas, sides.T))
         rank = np.empty(len(inner), dtype=int)
-        rank[::-1][np.argsort(merit[::-1], kind="stable")] = np.arange(len(inner))
+        rank[::-1][in_order(np.rint(1e6 * merit[::-1]).astype(int))[0]] = np.arange(len(inner))
         patch = np.arange(len(self.corners))
         free = np.ones(len(self.corners), dtype=bool)
-        while len(sides):
+        while len(rank):
             best = np.full(len(self.corners), -1)
-            np.maximum.at(best, sides.ravel(), np.repeat(rank, 2))
-            dominant = (best[sides] == rank[:, None]).all(axis=1)
-            merged = sides[dominant]
-            patch[merged[:, 1]] = patch[merged[:, 0]]
-            free[merged.ravel()] = False
-            left = free[sides].all(axis=1)
-            sides, rank = sides[left], rank[left]
-        patch = self._without_held_patches(patch, beside[inner])
+            np.maximum.at(best, sides.ravel(), np.tile(rank, 2))
+            one, other = sides[:, (best[sides] == rank).all(axis=0)]
+            patch[other] = patch[one]
+            free[one] = free[other] = False
+            left = free[sides].all(axis=0)
+            sides, rank = sides[:, left], rank[left]
+        patch = self._without_held_patches(patch, inner_sides)
         return (np.cumsum(np.bincount(patch) > 0) - 1)[patch]
 
     def _without_held_patches(self, patch: np.ndarray, sides: np.ndarray) -> np.ndarray:
-        """`patch`, with patches whose nodes all lie on walls joined to a neighbour: no unknown moves such nodes."""
-        moves = ~self.cloud.on_boundary[self.corners].all(axis=1)
+        """`patch`, with patches whose nodes all lie on walls joined to a neighbour: no unknown moves such nodes.
+
+        sides : the triangles beside each inner edge, (2, E).
+        """
+        moves = ~self.cloud.on_boundary[np.ascontiguousarray(self.corners.T)].all(axis=0)
         while True:
             held = np.bincount(patch, moves, len(patch))[patch] == 0.0
-            exits = sides[held[sides[:, 0]] != held[sides[:, 1]]]
-            if not len(exits):
+            one, other = sides[:, held[sides[0]] != held[sides[1]]]
+            if not len(one):
                 return patch
-            inner = held[exits[:, 0]]
-            ours = patch[np.where(inner, exits[:, 0], exits[:, 1])]
-            theirs = patch[np.where(inner, exits[:, 1], exits[:, 0])]
+            inner = held[one]
+            ours = patch[np.where(inner, one, other)]
+            theirs = patch[np.where(inner, other, one)]
             joined = np.arange(len(patch))
             joined[ours] = theirs
             patch = joined[patch]

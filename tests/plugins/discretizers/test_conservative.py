@@ -76,7 +76,7 @@ def test_a_patch_held_by_walls_is_joined_to_a_neighbour() -> None:
     assert cloud.on_boundary[corners[0]].all()
     alone = np.arange(len(corners))
     _, beside = held.edges
-    joined = held._without_held_patches(alone, beside[beside[:, 1] >= 0])
+    joined = held._without_held_patches(alone, beside[beside[:, 1] >= 0].T)
     assert joined[0] == joined[1]
     assert (np.delete(joined, 0) == np.arange(1, len(corners))).all()
 
