@@ -26,35 +26,27 @@ def place(i: int, j: int) -> int:
 
 
 def fitted(
-    x: np.ndarray,
-    y: np.ndarray,
-    w: np.ndarray,
-    degree: int,
-    derivatives: Iterable[tuple[int, int]],
-    factors: np.ndarray | None = None,
+    x: np.ndarray, y: np.ndarray, w: np.ndarray, degree: int, derivatives: Iterable[tuple[int, int]], radius: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """φ (D, k, T) of D derivatives ∂^(i+j)/∂x^i∂y^j times `factors` (D, T), for weights w (k, T) at x, y (k, T).
+    """φ (D, k, T) of D derivatives ∂^(i+j)/∂x^i∂y^j over radius^(i+j), for weights w (k, T) at x, y (k, T) over the
+    `radius` (T,) of each target.
 
     Also the smallest pivot of R relative to its column, where √w P = Q R, (T,): the root of that of the elimination.
-
-    factors : 1 where they are absent.
     """
-    chosen = np.array(derivatives)
-    factors = np.ones((len(chosen), x.shape[1])) if factors is None else factors
-    phi, smallest = (machine_code() or together)(x, y, w, degree, chosen, factors)
+    phi, smallest = (machine_code() or together)(x, y, w, degree, np.array(derivatives), radius)
     return phi, np.sqrt(smallest)
 
 
 def machine_code() -> Callable[..., Any] | None:
     """`in_blocks`, compiled; None where there is no compiler."""
-    return compiled(in_blocks, "f2 f2 f2 i0 i2 f2", place, eliminated, together)
+    return compiled(in_blocks, "f2 f2 f2 i0 i2 f1c", place, eliminated, together)
 
 
 def together(
-    x: np.ndarray, y: np.ndarray, w: np.ndarray, degree: int, derivatives: np.ndarray, factors: np.ndarray
+    x: np.ndarray, y: np.ndarray, w: np.ndarray, degree: int, derivatives: np.ndarray, radius: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """φ (D, k, T) of D derivatives ∂^(i+j)/∂x^i∂y^j, rows i, j of (D, 2), times `factors` (D, T), for weights w (k, T)
-    at x, y (k, T).
+    """φ (D, k, T) of D derivatives ∂^(i+j)/∂x^i∂y^j, rows i, j of (D, 2), over radius^(i+j), for weights w (k, T) at
+    x, y (k, T) over the `radius` (T,).
 
     Also the smallest pivot of the elimination relative to its diagonal entry, (T,): where it vanishes φ means nothing.
     """
@@ -89,7 +81,7 @@ def together(
             factorials *= n
         for n in range(2, j + 1):
             factorials *= n
-        system[place(i, j), count + d] = factorials * factors[d]
+        system[place(i, j), count + d] = factorials / radius ** (i + j)
     smallest = eliminated(system)
     phi = np.zeros((len(derivatives), near, targets))
     for d in range(len(derivatives)):
@@ -135,7 +127,7 @@ def eliminated(system: np.ndarray) -> np.ndarray:
 
 
 def in_blocks(
-    x: np.ndarray, y: np.ndarray, w: np.ndarray, degree: int, derivatives: np.ndarray, factors: np.ndarray
+    x: np.ndarray, y: np.ndarray, w: np.ndarray, degree: int, derivatives: np.ndarray, radius: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """`together`, AT_ONCE targets after AT_ONCE targets; φ of a target stays together."""
     near, targets = x.shape
@@ -148,7 +140,7 @@ def in_blocks(
             np.ascontiguousarray(w[:, begin:end]),
             degree,
             derivatives,
-            np.ascontiguousarray(factors[:, begin:end]),
+            radius[begin:end],
         )
         phi[:, begin:end] = part.transpose(0, 2, 1)
     return phi.transpose(0, 2, 1), smallest

@@ -48,12 +48,12 @@ def fit(
     """
     x, y, distance = places
     w = np.where(distance < 1.0, weight_function(weight, distance, shape), 0.0)
-    unscaled = np.stack([(1.0 / radius) ** (i + j) for i, j in derivatives])
-    phi, smallest = fitted(x, y, w, degree, derivatives, unscaled)
+    phi, smallest = fitted(x, y, w, degree, derivatives, radius)
     poor = np.flatnonzero(~(smallest >= SOUND))
     if len(poor):
         scaled, smallest[poor] = _by_orthogonal_columns(x[:, poor], y[:, poor], w[:, poor], degree, derivatives)
-        phi[..., poor] = scaled * unscaled[:, None, poor]
+        orders = np.array(derivatives).sum(axis=1)
+        phi[..., poor] = scaled / radius[poor] ** orders[:, None, None]
     return phi.transpose(0, 2, 1), smallest
 
 

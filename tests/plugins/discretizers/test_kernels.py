@@ -90,13 +90,13 @@ def test_an_operator_that_is_not_assembled_is_read_and_combined_like_a_matrix() 
         operator.nothing  # noqa: B018
 
 
-def test_weights_times_factors() -> None:
+def test_derivatives_in_the_unit_of_the_radius() -> None:
     random = np.random.default_rng(5)
-    x, y, factors = random.standard_normal((12, 7)), random.standard_normal((12, 7)), random.random((2, 7))
-    given = x, y, np.ones((12, 7)), 2, ((1, 0), (0, 1))
-    phi, smallest = normal_equations.fitted(*given)
-    times, same = normal_equations.fitted(*given, factors)
-    np.testing.assert_allclose(times, factors[:, None] * phi, rtol=1e-12)
+    x, y, radius = random.standard_normal((12, 7)), random.standard_normal((12, 7)), random.random(7)
+    given = x, y, np.ones((12, 7)), 2, ((0, 0), (1, 0), (1, 1))
+    phi, smallest = normal_equations.fitted(*given, np.ones(7))
+    over, same = normal_equations.fitted(*given, radius)
+    np.testing.assert_allclose(over, phi / radius ** np.array([[[0]], [[1]], [[2]]]), rtol=1e-12)
     np.testing.assert_array_equal(smallest, same)
 
 
@@ -122,7 +122,8 @@ def test_compiled_weights_are_numpys(degree: int, targets: int) -> None:
     sources, places = jittered_points(3), 0.1 + 0.8 * np.random.default_rng(1).random((targets, 2))
     supports = Supports.nearest(sources, places, 6 * (degree + 1))
     x, y = offsets(sources, places, supports.index) / supports.radius
-    given = x, y, np.exp(-9.0 * (x * x + y * y)), degree, ((0, 0), (1, 0), (0, 1), *([(2, 0), (1, 1)] * (degree > 1)))
+    derivatives = (0, 0), (1, 0), (0, 1), *([(2, 0), (1, 1)] * (degree > 1))
+    given = x, y, np.exp(-9.0 * (x * x + y * y)), degree, derivatives, supports.radius
     phi, smallest = normal_equations.fitted(*given)
     with numpy_alone():
         other, pivot = normal_equations.fitted(*given)
@@ -135,9 +136,9 @@ def test_compiled_weights_tell_supports_that_determine_nothing() -> None:
     """All neighbours at one place, on one line, and without weights."""
     x, y, w = np.zeros((8, 3)), np.zeros((8, 3)), np.ones((8, 3))
     x[:, 1], w[:, 2] = np.linspace(-1.0, 1.0, 8), 0.0
-    _, smallest = normal_equations.fitted(x, y, w, 2, ((1, 0),))
+    _, smallest = normal_equations.fitted(x, y, w, 2, ((1, 0),), np.ones(3))
     with numpy_alone():
-        _, other = normal_equations.fitted(x, y, w, 2, ((1, 0),))
+        _, other = normal_equations.fitted(x, y, w, 2, ((1, 0),), np.ones(3))
     np.testing.assert_array_equal(smallest, other)
     assert (smallest < 1e-7).all()
 
