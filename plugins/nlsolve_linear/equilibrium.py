@@ -33,7 +33,9 @@ def equilibrated(matrix: Any, symmetric: bool) -> tuple[np.ndarray, np.ndarray, 
             even = scaled(matrix, both, both)
         return both, both, even
     rows = powers_of_two(largest_in_rows(matrix))
-    columns = powers_of_two(abs(scaled(matrix, rows, np.ones_like(rows))).max(axis=0).toarray().ravel())
+    largest = np.zeros(matrix.shape[1])
+    np.maximum.at(largest, matrix.indices, np.abs(matrix.data) * np.repeat(rows, np.diff(matrix.indptr)))
+    columns = powers_of_two(largest)
     return rows, columns, scaled(matrix, rows, columns)
 
 
