@@ -23,8 +23,10 @@ SPARE = 8
 TIE = 1e-12
 """Two sources are equally near whose distances differ by less, relatively: the tree decides which is the last one."""
 
-
 FEW_LEAVES = 128  # sources in a leaf of a tree that is asked about few targets
+
+FAR = 2.0
+"""Times the distance of the last of the nearest sources: farther than the spare ones, as a rule."""
 
 
 @dataclass(frozen=True)
@@ -87,8 +89,8 @@ class Lists:
         if sources_before is not None:
             new = sources[sources_before < 0]
             if len(new):
-                farthest = float(reach.max(initial=0.0))
-                reach = np.minimum(reach, scipy.spatial.cKDTree(new).query(targets, distance_upper_bound=farthest)[0])
+                near = _around(new, float(reach.max(initial=0.0)), targets)
+                reach[near] = np.minimum(reach[near], scipy.spatial.cKDTree(new).query(targets[near])[0])
         rows, numbers = _as_they_are(len(targets), len(self.sources))
         if targets_before is not None:
             rows = targets_before
@@ -120,13 +122,17 @@ class Lists:
     def query(self, count: int, which: np.ndarray, quick: bool = False) -> tuple[np.ndarray, np.ndarray]:
         """Distances and numbers of the `count` nearest sources of the targets `which`, (W, count) each, by the tree.
 
-        quick : by one that is made in a third of the time, and may have equal distances in another order.
+        quick : by one of the sources around them, which may have equal distances in another order.
         """
         if quick and self.known_tree is None:
-            tree = scipy.spatial.cKDTree(self.sources, FEW_LEAVES, compact_nodes=False, balanced_tree=False)
-        else:
-            tree = self.tree
-        return by_tree(tree, self.targets)(count, which)
+            targets, far = self.targets[which], FAR * float(self.farthest[which].max())
+            some = _around(targets, far, self.sources)
+            if len(some) >= count:
+                tree = scipy.spatial.cKDTree(self.sources[some], FEW_LEAVES, compact_nodes=False, balanced_tree=False)
+                distance, index = tree.query(targets, np.arange(1, count + 1))
+                if distance.max() < far:
+                    return distance, some[index]
+        return by_tree(self.tree, self.targets)(count, which)
 
     @cached_property
     def tree(self) -> scipy.spatial.cKDTree:
@@ -139,6 +145,12 @@ def by_tree(
 ) -> Callable[[int, np.ndarray], tuple[np.ndarray, np.ndarray]]:
     """count, which -> distances and numbers of the `count` nearest sources of the targets `which`, (W, count) each."""
     return lambda count, which: tree.query(targets[which], np.arange(1, count + 1))
+
+
+def _around(centres: np.ndarray, distance: float, places: np.ndarray) -> np.ndarray:
+    """Numbers of the `places` (P, 2) in the rectangle that holds all points within a distance of the centres (C, 2)."""
+    inside = (places >= centres.min(axis=0) - distance) & (places <= centres.max(axis=0) + distance)
+    return np.flatnonzero(inside[:, 0] & inside[:, 1])
 
 
 def _steps(before: np.ndarray, now: np.ndarray, numbers: np.ndarray | None) -> np.ndarray:
