@@ -110,8 +110,9 @@ def kept(corners: Indices, nodes: Array, walls: Indices) -> Indices | None:
         quads, beside, hull = quadrilaterals(corners[near])
         if not flipped and not _is_convex(hull, x, y, walls, tie):
             return None
-        inside, size = _in_circle(x[quads], y[quads])
-        wrong = np.flatnonzero((inside > tie * size) & ~on_one_wall(walls[quads]))
+        inside, size = _in_circle(x.take(quads), y.take(quads))
+        wrong = np.flatnonzero(inside > tie * size)
+        wrong = wrong[~on_one_wall(walls[quads[:, wrong]])]
         if not len(wrong):
             return ordered(corners) if flipped else corners
         chosen = wrong[_alone(beside[:, wrong], len(near))]
@@ -121,7 +122,10 @@ def kept(corners: Indices, nodes: Array, walls: Indices) -> Indices | None:
             return None
         doubtful = np.zeros(len(nodes), dtype=bool)
         doubtful[quads[:, wrong]] = True
-        near, flipped = np.flatnonzero(doubtful[corners].any(axis=1)), True  # no other edge can have become wrong
+        near, flipped = (
+            np.flatnonzero(doubtful.take(corners.T).any(axis=0)),
+            True,
+        )  # no other edge can have become wrong
     return None
 
 

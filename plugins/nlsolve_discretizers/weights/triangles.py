@@ -57,7 +57,7 @@ class Triangles:
 
     @classmethod
     def _of(cls, cloud: Cloud, whole: np.ndarray) -> Triangles:
-        triangles = cls(cloud, whole[~on_one_wall(cloud.walls[np.ascontiguousarray(whole.T)])], whole)
+        triangles = cls(cloud, whole[~on_one_wall(cloud.walls.take(whole.T))], whole)
         if np.bincount(triangles.corners.ravel(), minlength=len(cloud.nodes))[cloud.interior].min(initial=1) == 0:
             raise SolveError(Status.BAD_CLOUD, "a node belongs to no triangle of the cloud: it coincides with another")
         return triangles
@@ -93,7 +93,7 @@ class Triangles:
     def inner_edges(self) -> np.ndarray:
         """The edges that have an end inside, (M, 2)."""
         ends, _ = self.edges
-        one, other = self.cloud.on_boundary[np.ascontiguousarray(ends.T)]
+        one, other = self.cloud.on_boundary.take(ends.T)
         return ends[~(one & other)]
 
     def midpoints(self) -> np.ndarray:
@@ -138,7 +138,7 @@ class Triangles:
 
         sides : the triangles beside each inner edge, (2, E).
         """
-        moves = ~self.cloud.on_boundary[np.ascontiguousarray(self.corners.T)].all(axis=0)
+        moves = ~self.cloud.on_boundary.take(self.corners.T).all(axis=0)
         while True:
             held = np.bincount(patch, moves, len(patch))[patch] == 0.0
             one, other = sides[:, held[sides[0]] != held[sides[1]]]
