@@ -51,7 +51,8 @@ def solve(
     begun, renewals, withheld = ledger.copy(), tangent.renewals, tangent.withheld
     measure = _measure_of(problem, start, counted.first_residual(start), tangent.linear)
     counted.judged_by(measure, start)
-    before, rows = start, list[dict[str, Any]]()
+    before = start
+    rows: list[dict[str, Any]] = []
     sizes = Sizes(np.inf, np.inf, np.inf, np.inf)
     claimed = denied = False
     idle = 0
