@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from functools import partial
+from math import isfinite
 from operator import lt
 from typing import Any
 
@@ -86,7 +87,7 @@ def solve(
             return stop.size(residual) <= stop.tolerance
         return measure.settled(state, residual, float(sizes.relative), stop.verified)
 
-    if not np.isfinite(measure.scale):
+    if not isfinite(measure.scale):
         why = problem.undefined(start) or "the law gave no finite viscosity"
         return ended(Status.NON_FINITE, f"the forces at the first state are not finite: {why}")
     if tangent.operator is not None and not solver.uses_operator:
@@ -143,7 +144,7 @@ def solve(
         solved = step.claim is not None and is_solved(before, residual)
         claimed |= step.claim is True and not solved
         denied |= step.claim is False and solved
-        if not np.isfinite(sizes.relative):
+        if not isfinite(sizes.relative):
             if not np.isfinite(step.state).all():
                 return ended(Status.NON_FINITE)
             return ended(Status.OUT_OF_DOMAIN, problem.undefined(step.state))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import Any
 
@@ -132,10 +133,10 @@ class Tangent(KeptTangent):
         if contraction is not None:
             self._told = True
             solves, self._accounted = self._solves - self._accounted, self._solves
-            rate, before = -float(np.log10(max(contraction, SMALLEST))), self._rate
+            rate, before = -math.log10(max(contraction, SMALLEST)), self._rate
             self._digits += solves * rate
             if before is not None:
-                rate = before + (rate - before) * (1.0 - np.exp(-solves / RECENT))
+                rate = before + (rate - before) * (1.0 - math.exp(-solves / RECENT))
             self._contraction, self._rate = contraction, rate
         if range is not None:
             self._range = range
