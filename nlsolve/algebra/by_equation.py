@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 
-from nlsolve.algebra.measure import ROUNDING, Measure
+from nlsolve.algebra.measure import ROUNDING, Measure, Sizes
 from nlsolve.contracts.linear_solver import Factors, LinearSolver
 from nlsolve.contracts.problem import NonlinearProblem, least_squares, norm, random_signs
 from nlsolve.contracts.status import SolveError
@@ -96,8 +96,13 @@ class ByEquation(Measure):
         """F_i over the largest s_i so far."""
         return residual / self._largest
 
+    def sizes(self, u: Array, residual: Array) -> Sizes:
+        """See above; the sizes of the terms at u enter the units of `weighted`."""
+        relative = self.relative(u, residual)
+        return Sizes(norm(residual), self.size(residual), norm(self.weighted(residual)), relative)
+
     def size(self, residual: Array) -> float:
-        """See above."""
+        """The root mean square of F_i over the s_i of the start."""
         return norm(residual * self._weights) / float(np.sqrt(max(len(residual), 1)))
 
     def relative(self, u: Array, residual: Array) -> float:

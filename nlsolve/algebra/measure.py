@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from typing import NamedTuple
 
 import numpy as np
 import scipy.sparse as sp
@@ -12,6 +13,21 @@ from nlsolve.contracts.status import SolveError
 from nlsolve.series import Array, NoSeries
 
 ROUNDING = 4.0 * float(np.finfo(float).eps)  # of r, or of ‖R‖ over the size of the terms of J u, where R is zero
+
+
+class Sizes(NamedTuple):
+    """How large R is at one state.
+
+    absolute : ‖R‖₂ in the unit of the problem.
+    size : by which all residuals of one solve are compared with each other.
+    weighted : ‖R‖₂ in the units of `Measure.weighted`.
+    relative : the relative residual.
+    """
+
+    absolute: float
+    size: float
+    weighted: float
+    relative: float
 
 
 class Measure(ABC):
@@ -34,12 +50,8 @@ class Measure(ABC):
         """R (U,) in units in which methods compare the residuals of states that are near each other."""
 
     @abstractmethod
-    def size(self, residual: Array) -> float:
-        """By which all residuals (U,) of one solve are compared with each other."""
-
-    @abstractmethod
-    def relative(self, u: Array, residual: Array) -> float:
-        """The relative residual at u (U,)."""
+    def sizes(self, u: Array, residual: Array) -> Sizes:
+        """Of R (U,) at u (U,)."""
 
     @abstractmethod
     def settled(self, u: Array, residual: Array, relative: float, tolerance: float) -> bool:
@@ -65,13 +77,10 @@ class ByScale(Measure):
         """R."""
         return residual
 
-    def size(self, residual: Array) -> float:
-        """‖R‖₂."""
-        return norm(residual)
-
-    def relative(self, u: Array, residual: Array) -> float:
-        """‖R‖₂/scale."""
-        return norm(residual) / self.scale
+    def sizes(self, u: Array, residual: Array) -> Sizes:
+        """‖R‖₂, and relative ‖R‖₂/scale."""
+        size = norm(residual)
+        return Sizes(size, size, size, size / self.scale)
 
     def settled(self, u: Array, residual: Array, relative: float, tolerance: float) -> bool:
         """‖R‖₂/scale ≤ tolerance."""

@@ -166,7 +166,7 @@ class FlowState:
         load : factor on boundary velocities and body forces.
         """
         operators, physics = self.operators, self.parts.physics
-        body_force = self.scene.body_force(self.cloud.nodes[self.cloud.interior], law, physics)
+        body_force = self.scene.body_force(self.cloud.nodes.take(self.cloud.interior, axis=0), law, physics)
         modulus: float | Array = 0.0
         if self.volumetric:
             modulus = physics.penalty_modulus(law, self.scene.reference_rate, self.rate_squared_at_volume_points)

@@ -6,18 +6,18 @@ Anderson (1965); Walker & Ni (2011), whose rule for an ill-conditioned ΔF is to
 from __future__ import annotations
 
 import numpy as np
-from scipy.linalg.lapack import dgeqrf
+from scipy.linalg.lapack import dgeqrf, dtrcon, dtrtrs
 
-WORST_CONDITION = 1e8  # of R in ΔF = Q R: beyond it γ amplifies the rounding in f
+WORST_CONDITION = 1e8  # ‖R‖₁ ‖R⁻¹‖₁ of ΔF = Q R: beyond it γ amplifies the rounding in f
 
 
 class Mixing:
-    """Keeps the last changes of u and f, and gives the next u.
+    """Keeps the last changes of f and of u + β f, and gives the next u.
 
     depth : the largest number m of changes that are kept.
     damping : β.
 
-    ΔU, ΔF : (U, m), m ≤ depth; the columns u_{j+1} − u_j and f_{j+1} − f_j, oldest first.
+    ΔF, ΔU + β ΔF : (U, m), m ≤ depth; the columns are changes from one u to the next, oldest first.
     """
 
     def __init__(self, depth: int, damping: float) -> None:
@@ -27,24 +27,23 @@ class Mixing:
     def forget(self) -> None:
         """Forget all changes, because f is another function from now on."""
         self._last: tuple[np.ndarray, np.ndarray] | None = None
-        self._states: list[np.ndarray] = []
         self._changes: list[np.ndarray] = []
+        self._moves: list[np.ndarray] = []
 
     def next(self, u: np.ndarray, f: np.ndarray) -> np.ndarray:
         """u_{k+1} from u_k and f_k = f(u_k), shape (U,)."""
+        plain = u + self._damping * f
         most = min(self._depth, len(u))  # more changes than unknowns determine no γ
         if self._last is not None and most:
-            self._states = [*self._states, u - self._last[0]][-most:]
-            self._changes = [*self._changes, f - self._last[1]][-most:]
-        self._last = u, f
-        plain = u + self._damping * f
+            self._changes = [*self._changes, f - self._last[0]][-most:]
+            self._moves = [*self._moves, plain - self._last[1]][-most:]
+        self._last = f, plain
         while m := len(self._changes):
-            rows = np.array([*self._changes, f])
             # Of (ΔF f): beside the R of ΔF stands Qᵀ f. numpy's qr is the same routine, at twice the time.
-            r = np.triu(dgeqrf(rows.T)[0][: m + 1])
-            left, sizes, right = np.linalg.svd(r[:m, :m])
-            if sizes[0] < WORST_CONDITION * sizes[-1]:  # not where all changes are zero
-                gamma = (r[:m, m] @ left / sizes) @ right
-                return plain - gamma @ np.array(self._states) - self._damping * (gamma @ rows[:m])
-            del self._states[0], self._changes[0]
+            factored = dgeqrf(np.array([*self._changes, f]).T, overwrite_a=True)[0]
+            r, projected = factored[:m, :m], factored[:m, m]  # below R stand the reflections that make up Q
+            if WORST_CONDITION * dtrcon(r)[0] > 1.0:
+                gamma = dtrtrs(r, projected)[0]
+                return plain - gamma @ np.array(self._moves)
+            del self._changes[0], self._moves[0]
         return plain

@@ -4,17 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from functools import partial
+from math import isfinite
 from operator import lt
 from typing import Any
 
 import numpy as np
 
 from nlsolve.algebra.by_equation import ByEquation
-from nlsolve.algebra.measure import ByScale, Measure
+from nlsolve.algebra.measure import ByScale, Measure, Sizes
 from nlsolve.contracts.linear_solver import LinearSolver
 from nlsolve.contracts.nonlinear_solver import NonlinearSolver
 from nlsolve.contracts.outcome import Outcome
-from nlsolve.contracts.problem import NonlinearProblem, norm
+from nlsolve.contracts.problem import NonlinearProblem
 from nlsolve.contracts.status import CaseStopped, SolveError, Status
 from nlsolve.results.columns import step_columns
 from nlsolve.series import Array
@@ -51,8 +52,9 @@ def solve(
     begun, renewals, withheld = ledger.copy(), tangent.renewals, tangent.withheld
     measure = _measure_of(problem, start, counted.first_residual(start), tangent.linear)
     counted.judged_by(measure, start)
-    before, rows = start, list[dict[str, Any]]()
-    residual_norm = size = np.inf
+    before = start
+    rows: list[dict[str, Any]] = []
+    sizes = Sizes(np.inf, np.inf, np.inf, np.inf)
     claimed = denied = False
     idle = 0
 
@@ -68,7 +70,7 @@ def solve(
             status,
             detail or status.sentence,
             before,
-            float(residual_norm),
+            float(sizes.relative),
             tuple(rows),
             claimed,
             denied,
@@ -83,9 +85,9 @@ def solve(
     def is_solved(state: Array, residual: Array) -> bool:
         if stop.kind == "absolute":
             return stop.size(residual) <= stop.tolerance
-        return measure.settled(state, residual, float(residual_norm), stop.verified)
+        return measure.settled(state, residual, float(sizes.relative), stop.verified)
 
-    if not np.isfinite(measure.scale):
+    if not isfinite(measure.scale):
         why = problem.undefined(start) or "the law gave no finite viscosity"
         return ended(Status.NON_FINITE, f"the forces at the first state are not finite: {why}")
     if tangent.operator is not None and not solver.uses_operator:
@@ -105,7 +107,7 @@ def solve(
         except SolveError as error:
             lost = error.status is Status.SINGULAR_TANGENT
             residual = counted.uncounted_residual(before)
-            if not stop.is_of_residuals and (size == 0.0 or (lost and measure.vanishes(before, residual))):
+            if not stop.is_of_residuals and (sizes.size == 0.0 or (lost and measure.vanishes(before, residual))):
                 return ended(Status.CONVERGED, "R = 0, and the method has no further step to compare or to claim")
             denied |= bool(rows) and is_solved(before, residual)
             return ended(error.status, error.detail)
@@ -121,9 +123,8 @@ def solve(
             checked_residual(residual, start, problem)
         elif ledger.counts.total() - ledger.counts["method"] == worked and not np.array_equal(state, before):
             idle += 1
-        size_before, size = size, measure.size(residual)
-        residual_norm, progress = measure.relative(step.state, residual), size / measure.scale
-        contraction = (size / size_before if size_before else 0.0) if number else None
+        size_before, sizes = sizes.size, measure.sizes(state, residual)
+        contraction = (sizes.size / size_before if size_before else 0.0) if number else None
         tangent.step_taken(contraction)
         difference = stop.difference(step.state, before) if number else np.nan
         before = step.state.copy()  # a method may overwrite its array later
@@ -133,17 +134,17 @@ def solve(
             "step": number,
             "tangents": tangent.renewals,
             "triangular_solves": ledger.counts["triangular_solve"],
-            "residual_norm": residual_norm,
-            "residual_absolute": norm(residual),
+            "residual_norm": sizes.relative,
+            "residual_absolute": sizes.absolute,
             "difference": difference,
             "seconds": ledger.seconds["method"],
         }
-        contraction_column = {"contraction": np.nan if contraction is None else contraction}
-        rows.append(measured | contraction_column | step_columns(step.notes) | measured)
+        told = np.nan if contraction is None else contraction
+        rows.append({**measured, "contraction": told, **step_columns(step.notes), **measured})
         solved = step.claim is not None and is_solved(before, residual)
         claimed |= step.claim is True and not solved
         denied |= step.claim is False and solved
-        if not np.isfinite(residual_norm):
+        if not isfinite(sizes.relative):
             if not np.isfinite(step.state).all():
                 return ended(Status.NON_FINITE)
             return ended(Status.OUT_OF_DOMAIN, problem.undefined(step.state))
@@ -151,13 +152,14 @@ def solve(
             if not stop.is_of_residuals:  # accepts a state without its residual
                 claimed |= not is_solved(before, residual)
             if stop.kind == "absolute":
-                measure.settled(step.state, residual, residual_norm, np.inf)  # for the correction that is reported
+                measure.settled(step.state, residual, sizes.relative, np.inf)  # for the correction that is reported
             return ended(Status.CONVERGED)
+        progress = sizes.size / measure.scale
         if number == 0:
             first = progress
         if progress > GROWTH_OF_DIVERGENCE * max(1.0, first):
             return ended(Status.DIVERGED)
-        now = progress, norm(measure.weighted(residual)), residual_norm
+        now = progress, sizes.weighted, sizes.relative
         since_best = 0 if any(map(lt, now, best)) else since_best + 1
         best = list(map(min, best, now))
         if since_best >= PATIENCE:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -45,10 +45,23 @@ class Tangent(KeptTangent):
         self.operator = operator
         self._matrix: CountedMatrix | None = None
         self.factors: Factors | None = None
-        self.history = TangentHistory()
         self.renewals = self.withheld = 0
-        self._accounted = 0  # solves whose digits are in the history
+        self._forget()
+
+    def _forget(self) -> None:
+        """Nothing has been observed of this K* yet."""
+        self._uses = self._solves = 0
+        self._contraction: float | None = None
+        self._range: float | None = None
+        self._digits = 0.0
+        self._rate: float | None = None
+        self._accounted = 0  # solves whose digits are known
         self._told = False  # whether the method has reported a contraction since the last step, with this K*
+
+    @property
+    def history(self) -> TangentHistory:
+        """What has been observed of this K* since it was factorised."""
+        return TangentHistory(self._uses, self._contraction, self._range, self._solves, self._digits, self._rate)
 
     def refresh_if_due(self, assemble: Callable[[], Any]) -> bool:
         """See `KeptTangent`; the factorisation is entered in the ledger."""
@@ -59,9 +72,9 @@ class Tangent(KeptTangent):
         if due:
             self._matrix = counted(assemble(), self._ledger)
             self.factors = self._factorized(self._matrix)
-            self.history, self._accounted, self._told = TangentHistory(), 0, False
+            self._forget()
             self.renewals += 1
-        self.history = replace(self.history, uses=self.history.uses + 1)
+        self._uses += 1
         return due
 
     def _factorized(self, matrix: CountedMatrix) -> Factors:
@@ -92,7 +105,7 @@ class Tangent(KeptTangent):
         x = self._solved(self.factors, rhs)
         for _ in range(self.linear.refinement):
             x = x + self._solved(self.factors, rhs - self._matrix @ x)
-        self.history = replace(self.history, solves=self.history.solves + 1)
+        self._solves += 1
         if not np.isfinite(x).all():
             why = "a solve with the tangent gave no finite answer"
             if self.operator is None:
@@ -119,14 +132,14 @@ class Tangent(KeptTangent):
         """See `KeptTangent`."""
         if contraction is not None:
             self._told = True
-            solves, self._accounted = self.history.solves - self._accounted, self.history.solves
-            rate, before = -float(np.log10(max(contraction, SMALLEST))), self.history.rate
-            digits = self.history.digits + solves * rate
+            solves, self._accounted = self._solves - self._accounted, self._solves
+            rate, before = -math.log10(max(contraction, SMALLEST)), self._rate
+            self._digits += solves * rate
             if before is not None:
-                rate = before + (rate - before) * (1.0 - np.exp(-solves / RECENT))
-            self.history = replace(self.history, contraction=contraction, digits=digits, rate=rate)
+                rate = before + (rate - before) * (1.0 - math.exp(-solves / RECENT))
+            self._contraction, self._rate = contraction, rate
         if range is not None:
-            self.history = replace(self.history, range=range)
+            self._range = range
 
     def step_taken(self, contraction: float | None) -> None:
         """Give the refresh rule the contraction of a step, unless the method has reported one itself.

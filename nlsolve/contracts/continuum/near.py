@@ -13,6 +13,9 @@ from nlsolve.series import Array, Indices
 LISTED = 8
 """Nodes that are listed around each one."""
 
+AHEAD = 10
+"""Further moves like the last for which a list should serve where the tree of the nodes is built anyway."""
+
 
 @dataclass(frozen=True)
 class Near:
@@ -38,7 +41,8 @@ class Near:
         return near._filled(np.arange(len(nodes)), tree) if count else near
 
     def moved_to(self, nodes: Array, tree: Callable[[], scipy.spatial.cKDTree]) -> Near:
-        """The same for the nodes at other places (N, 2); their tree is asked about those whose list may be too short.
+        """The same for the nodes at other places (N, 2). Where the list of one may be too short, their tree is asked
+        about all whose lists may be so within `AHEAD` such moves.
 
         |x_i − x_j| ≥ r_i − |δx_i| − max_j |δx_j| for all j that are not listed; the maximum is over those that are near
         enough to come so near.
@@ -47,13 +51,15 @@ class Near:
         dx, dy = x - self.nodes[:, 0], y - self.nodes[:, 1]
         steps = np.sqrt(dx * dx + dy * dy)
         within = float(np.max(self.reach, where=np.isfinite(self.reach), initial=0.0)) + steps.max(initial=0.0)
-        reach = self.reach - steps - largest_near(self.nodes, steps, self.nodes, within)
+        lost = steps + largest_near(self.nodes, steps, self.nodes, within)
+        reach = self.reach - lost
         dx, dy = x.take(self.listed) - x, y.take(self.listed) - y
         distance = np.sqrt((dx * dx + dy * dy).min(axis=0, initial=np.inf))
-        short = np.flatnonzero(~(distance < reach) & np.isfinite(reach))
-        if not len(short):
+        limited = np.isfinite(reach)
+        if not (limited & ~(distance < reach)).any():
             return Near(nodes, self.listed, reach, distance)
-        return Near(nodes, self.listed.copy(), reach, distance)._filled(short, tree())
+        soon = np.flatnonzero(limited & ~(distance + AHEAD * lost < reach))
+        return Near(nodes, self.listed.copy(), reach, distance)._filled(soon, tree())
 
     def _filled(self, which: Indices, tree: scipy.spatial.cKDTree) -> Near:
         """These, still in nobody's hands, with what the tree finds for the nodes `which`."""

@@ -89,7 +89,7 @@ class Flow(NonlinearProblem):
         volumetric = operators.volumetric
         if volumetric is not None and np.max(penalty_modulus) > 0.0:
             self._volumetric = volumetric
-            self._modulus = np.broadcast_to(penalty_modulus, len(volumetric.points))
+            self._modulus = np.full(len(volumetric.points), penalty_modulus)
             given = volumetric.rate @ lifted
             if drift is not None and drift.dilatation is not None:
                 given = given + drift.dilatation
@@ -97,8 +97,8 @@ class Flow(NonlinearProblem):
             if pressure is not None:
                 constant += volumetric.force @ pressure
         if inertia is not None:
-            self._inertia = areas * np.full(len(self._free), inertia.density_over_increment)
-            constant -= self._inertia * inertia.previous[cloud.interior].ravel()
+            self._inertia = areas * inertia.density_over_increment
+            constant -= self._inertia * self.unknowns(inertia.previous)
         if convection is not None:
             self._carried = Carried(convection, cloud, areas, lifted)
         if body_force is not None:
@@ -259,7 +259,7 @@ class Flow(NonlinearProblem):
 
     def unknowns(self, velocity: Array) -> Array:
         """u, shape (2F,), from the velocities (N, 2) of all nodes."""
-        return velocity[self.cloud.interior].ravel()
+        return velocity.take(self.cloud.interior, axis=0).ravel()
 
     def rates(self, u: Array) -> PointRates:
         """ε̇ at the strain points and tr ε̇ at the volume points."""

@@ -81,10 +81,9 @@ class Ledger:
 
     def since(self, before: Ledger) -> Ledger:
         """A ledger of what has been entered since `before`, a copy of this ledger, was made."""
-        spent = self.copy()
-        spent.counts.subtract(before.counts)
-        spent.seconds.subtract(before.seconds)
-        return spent
+        counts = {kind: count - before.counts[kind] for kind, count in self.counts.items()}
+        seconds = {kind: spent - before.seconds[kind] for kind, spent in self.seconds.items()}
+        return Ledger(self.clock, Counter(counts), Counter(seconds))
 
     def add(self, counts: Mapping[str, int], seconds: Mapping[str, float]) -> None:
         """Enter work that was done elsewhere, by kind."""

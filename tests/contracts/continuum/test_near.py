@@ -9,7 +9,7 @@ import pytest
 import scipy
 
 from nlsolve.contracts.continuum.cloud import Cloud
-from nlsolve.contracts.continuum.near import Near, largest_near
+from nlsolve.contracts.continuum.near import AHEAD, Near, largest_near
 from nlsolve.contracts.status import SolveError
 from nlsolve.series import Array
 
@@ -50,6 +50,26 @@ def test_the_tree_is_asked_about_those_only_whose_lists_are_too_short(monkeypatc
     cloud = cloud.moved_to(moved)
     assert asked[1:] == [400]  # it may have come near any of them
     np.testing.assert_allclose(cloud.nearest_distance, by_tree(moved), rtol=1e-13)
+
+
+def test_a_tree_that_is_built_serves_the_next_moves_too(monkeypatch: pytest.MonkeyPatch) -> None:
+    def trees(ahead: int) -> int:
+        monkeypatch.setattr("nlsolve.contracts.continuum.near.AHEAD", ahead)
+        built: list[scipy.spatial.cKDTree] = []
+
+        def tree() -> scipy.spatial.cKDTree:
+            built.append(scipy.spatial.cKDTree(nodes))
+            return built[-1]
+
+        nodes = np.random.default_rng(0).random((400, 2))
+        near = Near.of(nodes, scipy.spatial.cKDTree(nodes))
+        for _ in range(40):
+            nodes = nodes + 1e-3 * np.stack([nodes[:, 1], np.zeros(400)], axis=1)  # a shear
+            near = near.moved_to(nodes, tree)
+            np.testing.assert_allclose(near.distance, by_tree(nodes), rtol=1e-13)
+        return len(built)
+
+    assert 3 * trees(AHEAD) < trees(0)
 
 
 @pytest.mark.parametrize("within", [0.0, 0.05, 0.3, 2.0])
