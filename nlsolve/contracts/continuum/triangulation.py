@@ -122,10 +122,8 @@ def kept(corners: Indices, nodes: Array, walls: Indices) -> Indices | None:
             return None
         doubtful = np.zeros(len(nodes), dtype=bool)
         doubtful[quads[:, wrong]] = True
-        near, flipped = (
-            np.flatnonzero(doubtful.take(corners.T).any(axis=0)),
-            True,
-        )  # no other edge can have become wrong
+        near = np.flatnonzero(doubtful.take(corners.T).any(axis=0))  # no other edge can have become wrong
+        flipped = True
     return None
 
 

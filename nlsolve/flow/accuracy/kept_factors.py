@@ -27,6 +27,9 @@ class KeptFactors(LinearSolver):
 
     For a few Newton steps that need not be exact, on a matrix too large to be factorised at each (Saad & Schultz 1986,
     preconditioned on the right, so that what GMRES tests is the true residual).
+
+    linear : the linear solver that factorises.
+    coarser : the tangent on a coarser cloud (`Coarser`); None without one.
     """
 
     kind: Literal["kept-factors"] = "kept-factors"
