@@ -39,6 +39,16 @@ def equilibrated(matrix: Any, symmetric: bool) -> tuple[np.ndarray, np.ndarray, 
     return rows, columns, scaled(matrix, rows, columns)
 
 
+def even_by_diagonal(matrix: Any) -> tuple[np.ndarray, np.ndarray, Any]:
+    """R twice, (U,), and R A R with a diagonal between 1/4 and 1, which no entry of a positive definite matrix exceeds
+    (van der Sluis 1969).
+
+    matrix : in compressed rows, with a positive diagonal.
+    """
+    both = powers_of_two(np.sqrt(matrix.diagonal()))
+    return both, both, scaled(matrix, both, both)
+
+
 def scaled(matrix: Any, rows: np.ndarray, columns: np.ndarray) -> Any:
     """R A C with the pattern of A, compressed rows; nothing is rounded for powers of two."""
     data = np.repeat(rows, np.diff(matrix.indptr)) * matrix.data * columns[matrix.indices]

@@ -49,6 +49,11 @@ class Layout:
         return cls(given, numbered.data, numbered.indptr, numbered.indices)
 
     @property
+    def entries(self) -> int:
+        """E, the number of entries."""
+        return len(self.columns)
+
+    @property
     def has_duplicates(self) -> bool:
         """Whether a place is stored twice."""
         within_row = np.ones(len(self.columns), dtype=bool)

@@ -15,7 +15,7 @@ import scipy.sparse as sp
 from pydantic import Field
 
 from nlsolve.plugin import Factors, LinearSolver, SolveError, Status
-from nlsolve_linear.equilibrium import equilibrated, is_symmetric
+from nlsolve_linear.equilibrium import equilibrated, even_by_diagonal, is_symmetric
 from nlsolve_linear.layout import Layout, laid_out
 
 try:
@@ -25,21 +25,34 @@ except ImportError:  # an extra: nlsolve[pardiso]
 
 ABSENT = "needs the library py-mkl-pardiso, for x86-64 only: pip install 'nlsolve[pardiso]'"
 
-LU, LDLT, LLT = "lu", "ldlt", "llt"
+LU, MATCHED_LU, LDLT, LLT = "lu", "matched lu", "ldlt", "llt"
 
-# PARDISO's parameters, counted from zero. Dissection by METIS; pivots below 10⁻¹³ of the norm are perturbed; scaling
-# and matching for LU, pivots of Bunch & Kaufman (1977) for LDLᵀ, none for LLᵀ; the entries of the factors are counted.
-# No refinement: the ledger refines.
+# PARDISO's parameters, counted from zero. Pivots below 10⁻¹³ of the norm are perturbed; scaling and matching for a
+# matched LU, pivots of Bunch & Kaufman (1977) for LDLᵀ, none beyond those of the diagonal blocks for LU and LLᵀ; the
+# entries of the factors are counted. No refinement: the ledger refines.
 PARAMETERS: dict[str, dict[int, int]] = {
-    LU: {1: 2, 9: 13, 10: 1, 12: 1, 17: -1},
-    LDLT: {1: 2, 9: 13, 17: -1, 20: 1},
-    LLT: {1: 2, 17: -1},
+    LU: {9: 13, 10: 0, 12: 0, 17: -1},
+    MATCHED_LU: {9: 13, 10: 1, 12: 1, 17: -1},
+    LDLT: {9: 13, 17: -1, 20: 1},
+    LLT: {17: -1},
 }
-PERTURBED, ENTRIES = 13, 17
-"""Where PARDISO tells how many pivots it has perturbed, and how many entries the factors hold."""
+ORDERING, PERTURBED, ENTRIES = 1, 13, 17
+"""Where PARDISO is told which ordering to take, and where it tells how many pivots it has perturbed and how many
+entries the factors hold.
+"""
 
-ACCURATE = 1e-9
-"""Largest ‖b − A x‖ over the size of its terms of factors that solve what they were made for."""
+MINIMUM_DEGREE, DISSECTION = (0, "minimum degree"), (2, "metis")
+"""Orderings, with their names."""
+
+FEW = 450_000
+"""Entries of a matrix up to which an ordering by minimum degree takes half the time of a dissection by METIS, or less,
+and its factors have as many entries within 10 %.
+"""
+
+ACCURATE = {LU: 1e-12, MATCHED_LU: 1e-9, LDLT: 1e-9, LLT: 1e-9}
+"""Largest ‖b − A x‖ over the size of its terms of factors that solve what they were made for; what an LU leaves beyond
+that is matched.
+"""
 
 REACHED = 1e-6
 """The same over ‖b‖ where a pivot was perturbed or, in LLᵀ, may be mere rounding: a singular matrix does not reach
@@ -54,11 +67,18 @@ class _Analysed:
     """One pattern with its analysis in the library, and the factors that this holds now."""
 
     def __init__(self, kind: str, layout: Layout, matrix: Any) -> None:
-        types = {LU: mkl.MTYPE_REAL_NONSYM, LDLT: mkl.MTYPE_REAL_SYM_INDEF, LLT: mkl.MTYPE_REAL_SYM_POSDEF}
+        general = mkl.MTYPE_REAL_NONSYM
+        types = {
+            LU: general,
+            MATCHED_LU: general,
+            LDLT: mkl.MTYPE_REAL_SYM_INDEF,
+            LLT: mkl.MTYPE_REAL_SYM_POSDEF,
+        }
+        ordering, self.ordering = MINIMUM_DEGREE if layout.entries <= FEW else DISSECTION
         # Its constructor looks at a symmetric matrix row by row, which takes longer than the analysis: it gets one row.
         # The pattern is set in what it wraps; tests hold every release against this.
         one = sp.csr_array(np.ones((1, 1)))
-        self.solver: Any = mkl.PardisoSolver(one, types[kind], iparms=PARAMETERS[kind])
+        self.solver: Any = mkl.PardisoSolver(one, types[kind], iparms={ORDERING: ordering, **PARAMETERS[kind]})
         starts, columns = (part.astype(np.int64) for part in (matrix.indptr, matrix.indices))
         self.solver._solver.set_pattern(ia=starts, ja=columns, n=matrix.shape[0])
         self.solver.set_iparm(ENTRIES, PARAMETERS[kind][ENTRIES])  # has become the number of entries of one row
@@ -85,26 +105,28 @@ class PardisoFactors(Factors):
         earlier = previous._library if isinstance(previous, PardisoFactors) else None
         layout, rows = laid_out(compressed, None if earlier is None else earlier.layout)
         symmetric = detect and is_symmetric(rows)
-        self._rows, self._columns, matrix = equilibrated(rows, symmetric)
-        stored = layout.upper_of(matrix) if symmetric else matrix
-        self._values = stored.data
         self._library: _Analysed
         if earlier is not None and earlier.layout is not layout:
             earlier = None
-        kinds = _kinds(matrix, earlier) if symmetric else [LU]
-        for tried, kind in enumerate(kinds, start=1):
+        for tried, kind in enumerate(_kinds(rows.diagonal(), symmetric, earlier), start=1):
             self.attempts = tried
+            if kind == LLT:
+                self._rows, self._columns, matrix = even_by_diagonal(rows)
+            else:
+                self._rows, self._columns, matrix = equilibrated(rows, symmetric)
+            stored = layout.upper_of(matrix) if symmetric else matrix
+            self._values = stored.data
             try:
                 left = self._made(kind, layout, stored, matrix, earlier)
             except RuntimeError as failure:
                 why = str(failure)
             else:
-                if left <= ACCURATE:
+                if left <= ACCURATE[kind]:
                     break
                 why = "its factors do not solve with the matrix"
         else:
             raise SolveError(Status.SINGULAR_TANGENT, f"PARDISO: {why}")
-        self.ordering = f"metis, {kind}"
+        self.ordering = f"{self._library.ordering}, {kind}"
         self.fill = int(self._library.solver.get_iparm_value(ENTRIES))
 
     def _made(self, kind: str, layout: Layout, stored: Any, matrix: Any, earlier: _Analysed | None) -> float:
@@ -119,7 +141,7 @@ class PardisoFactors(Factors):
         self._library = earlier
         self._library.hold(self._values)
         left = self._left(matrix, norm)
-        if left > ACCURATE:  # the analysis has the scaling and the matching of other values
+        if left > ACCURATE[kind]:  # the analysis has the scaling and the matching of other values
             self._library.hold(self._values, anew=True)
             left = self._left(matrix, norm)
         return left
@@ -142,17 +164,21 @@ class PardisoFactors(Factors):
         return self._columns * self._library.solver.solve(self._rows * rhs)
 
 
-def _kinds(matrix: Any, earlier: _Analysed | None) -> list[str]:
-    """The factors to be tried of a symmetric matrix: LLᵀ, which exist where it is positive definite, are the cheapest;
-    an earlier matrix of the same pattern that had none is followed by others as a rule.
+def _kinds(diagonal: np.ndarray, symmetric: bool, earlier: _Analysed | None) -> list[str]:
+    """The factors to be tried of a matrix with this diagonal, the cheapest first: LLᵀ, which a symmetric matrix has
+    where it is positive definite, and an LU without matching, which large pivots in their places allow.
+
+    An earlier matrix of the same pattern that had none is followed by others as a rule.
     """
-    indefinite = (earlier is not None and earlier.kind == LDLT) or matrix.diagonal().min(initial=np.inf) <= 0.0
-    return [LDLT] if indefinite else [LLT, LDLT]
+    cheap, sure = (LLT, LDLT) if symmetric else (LU, MATCHED_LU)
+    lowest = (diagonal if symmetric else np.abs(diagonal)).min(initial=np.inf)
+    return [sure] if lowest <= 0.0 or (earlier is not None and earlier.kind == sure) else [cheap, sure]
 
 
 class Pardiso(LinearSolver):
-    """LU with scaling, matching and pivots within supernodes; for a symmetric matrix LLᵀ, or LDLᵀ where it is not
-    positive definite, at half the entries.
+    """LU with pivots within supernodes, after scaling and matching where it is not exact without; for a symmetric matrix
+    LLᵀ, or LDLᵀ where it is not positive definite, at half the entries. Ordered by minimum degree, or by dissection
+    where there are many entries.
 
     Its factors give no condition: PARDISO must analyse anew before it solves with the transposed matrix.
     """

@@ -17,10 +17,10 @@ from cases import near, run, spin_flow
 from fakes import registry_of
 from nlsolve_linear import pardiso as nlsolve_pardiso
 from nlsolve_linear import rslab as nlsolve_rslab
-from nlsolve_linear.equilibrium import equilibrated, is_symmetric
+from nlsolve_linear.equilibrium import equilibrated, even_by_diagonal, is_symmetric
 from nlsolve_linear.ilu_gmres import IluGmres
 from nlsolve_linear.lapack import LARGEST, Lapack
-from nlsolve_linear.pardiso import Pardiso
+from nlsolve_linear.pardiso import FEW, Pardiso
 from nlsolve_linear.rslab import Rslab
 from nlsolve_linear.superlu import SuperLU
 from nlsolve_rules.refresh import EveryIteration, Never
@@ -433,7 +433,7 @@ class TestPardiso:
         symmetric, general = (
             Pardiso(symmetric=kind).factorize(tangent("conservative")) for kind in ("detect", "never")
         )
-        assert (symmetric.ordering, general.ordering) == ("metis, llt", "metis, lu")
+        assert (symmetric.ordering, general.ordering) == ("minimum degree, llt", "minimum degree, lu")
         assert symmetric.fill < 0.7 * general.fill
 
     def test_a_matrix_that_is_not_positive_definite_has_factors_with_pivots(self) -> None:
@@ -445,7 +445,7 @@ class TestPardiso:
         first = Pardiso().factorize(definite)
         second = Pardiso().factorize(other, first)
         third = Pardiso().factorize(definite, second)
-        assert [factors.ordering for factors in (first, second, third)] == ["metis, llt", "metis, ldlt", "metis, ldlt"]
+        assert [factors.ordering for factors in (first, second, third)] == ["minimum degree, llt", "minimum degree, ldlt", "minimum degree, ldlt"]
         assert [factors.attempts for factors in (first, second, third)] == [1, 2, 1]
         for factors, matrix in ((first, definite), (second, other), (third, definite)):
             np.testing.assert_allclose(matrix @ factors.solve(rhs), rhs, atol=1e-14)
@@ -464,6 +464,27 @@ class TestPardiso:
         for symmetric in ("detect", "never"):
             x = Pardiso(symmetric=symmetric).factorize(saddle).solve(np.ones(3))
             np.testing.assert_allclose(saddle @ x, np.ones(3), rtol=1e-12)
+
+    def test_what_has_no_large_pivots_in_their_places_is_matched(self) -> None:
+        """Rows of a regular matrix turned by one place: the diagonal is small beside its neighbours."""
+        random = np.random.default_rng(2)
+        regular = sp.random_array((60, 60), density=0.1, rng=random, format="csr") + 9.0 * sp.eye_array(60, format="csr")
+        turned = (regular[np.roll(np.arange(60), 1)] + 1e-14 * sp.eye_array(60)).tocsr()
+        rhs = np.arange(60.0)
+        first, second = (Pardiso().factorize(matrix) for matrix in (regular, turned))
+        assert [factors.ordering for factors in (first, second)] == ["minimum degree, lu", "minimum degree, matched lu"]
+        assert [factors.attempts for factors in (first, second)] == [1, 2]
+        third = Pardiso().factorize(turned, second)
+        assert third.attempts == 1
+        for factors, matrix in ((first, regular), (second, turned), (third, turned)):
+            np.testing.assert_allclose(matrix @ factors.solve(rhs), rhs, atol=1e-11)
+
+    def test_many_entries_are_ordered_by_dissection(self) -> None:
+        ones = np.ones(FEW // 3 + 1)
+        chain = sp.diags_array([-ones[1:], 3.0 * ones, -1.5 * ones[1:]], offsets=[-1, 0, 1], format="csr")
+        factors = Pardiso().factorize(chain)
+        assert factors.ordering == "metis, lu"
+        np.testing.assert_allclose(chain @ factors.solve(ones), ones, atol=1e-12)
 
     def test_values_that_the_analysis_does_not_fit_are_analysed_anew(self) -> None:
         random = np.random.default_rng(3)
@@ -495,6 +516,16 @@ def test_equilibrium_brings_rows_and_columns_to_one_size(symmetric: bool) -> Non
     largest = np.delete(np.abs(even.toarray()).max(axis=0), 3)
     assert ((largest >= 0.1) & (largest <= 8.0)).all()
     assert set(np.frexp(rows)[0]) == {0.5}
+
+
+def test_the_diagonal_tells_the_size_of_a_positive_definite_matrix() -> None:
+    random = np.random.default_rng(0)
+    factor, sizes = random.standard_normal((9, 9)), 10.0 ** random.uniform(-20, 20, 9)
+    dense = sizes[:, None] * (factor @ factor.T) * sizes
+    rows, columns, even = even_by_diagonal(sp.csr_array(dense))
+    np.testing.assert_array_equal(even.toarray(), rows[:, None] * dense * columns)
+    assert ((even.diagonal() >= 0.25) & (even.diagonal() <= 1.0)).all()
+    assert np.abs(even.toarray()).max() <= 1.0
 
 
 def test_a_matrix_whose_entries_cancel_on_one_side_only_is_symmetric() -> None:
