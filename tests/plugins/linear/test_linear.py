@@ -445,7 +445,11 @@ class TestPardiso:
         first = Pardiso().factorize(definite)
         second = Pardiso().factorize(other, first)
         third = Pardiso().factorize(definite, second)
-        assert [factors.ordering for factors in (first, second, third)] == ["minimum degree, llt", "minimum degree, ldlt", "minimum degree, ldlt"]
+        assert [factors.ordering for factors in (first, second, third)] == [
+            "minimum degree, llt",
+            "minimum degree, ldlt",
+            "minimum degree, ldlt",
+        ]
         assert [factors.attempts for factors in (first, second, third)] == [1, 2, 1]
         for factors, matrix in ((first, definite), (second, other), (third, definite)):
             np.testing.assert_allclose(matrix @ factors.solve(rhs), rhs, atol=1e-14)
@@ -468,7 +472,7 @@ class TestPardiso:
     def test_what_has_no_large_pivots_in_their_places_is_matched(self) -> None:
         """Rows of a regular matrix turned by one place: the diagonal is small beside its neighbours."""
         random = np.random.default_rng(2)
-        regular = sp.random_array((60, 60), density=0.1, rng=random, format="csr") + 9.0 * sp.eye_array(60, format="csr")
+        regular = sp.random_array((60, 60), density=0.1, rng=random, format="csr") + 9.0 * sp.eye_array(60)
         turned = (regular[np.roll(np.arange(60), 1)] + 1e-14 * sp.eye_array(60)).tocsr()
         rhs = np.arange(60.0)
         first, second = (Pardiso().factorize(matrix) for matrix in (regular, turned))
