@@ -10,7 +10,7 @@ from nlsolve.contracts.continuum.discretizer import Discretizer, Operators, Poin
 from nlsolve.contracts.continuum.law import ConstitutiveLaw, PowerForm, local_index, stress, tangent_moduli
 from nlsolve.contracts.continuum.near import largest_near
 from nlsolve.contracts.continuum.terms import NodeMotion, Physics, Recording, TimeSteps
-from nlsolve.contracts.continuum.triangulation import doubled_areas, in_order, on_one_wall, side_keys
+from nlsolve.contracts.continuum.triangulation import doubled_areas, in_order, on_one_wall, side_keys, subdivided
 from nlsolve.contracts.continuum.walls import middles as wall_middles
 from nlsolve.contracts.continuum.walls import wall_edges
 from nlsolve.contracts.linear_solver import Factors, LinearSolver
@@ -100,6 +100,7 @@ __all__ = [
     "on_one_wall",
     "side_keys",
     "stress",
+    "subdivided",
     "tangent_moduli",
     "unit",
     "wall_edges",

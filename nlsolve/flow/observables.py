@@ -162,7 +162,7 @@ def nodal_fields(
     """
     nodes = flow.cloud.nodes
     u = flow.unknowns(velocity)
-    to_nodes = discretizer.values(flow.operators.strain.points, nodes)
+    to_nodes = flow.to_nodes(discretizer)
     exx, eyy, exy = rates = np.stack([to_nodes @ component for component in flow.strain_rate(u)])
     sxx, syy, sxy = stress(flow.law, rates)
     at_volume_points, pressure = flow.pressure(u), np.full(len(nodes), np.nan)

@@ -16,7 +16,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import scipy
 
 from nlsolve.contracts.continuum.law import CONTRACTION, rate_squared, stress
 from nlsolve.contracts.status import SolveError
@@ -143,7 +142,7 @@ def audit(
     }
     try:
         gradient = parts.discretizer.gradient(flow.cloud)
-        to_nodes = parts.discretizer.values(flow.operators.strain.points, flow.cloud.nodes)
+        to_nodes = flow.to_nodes(parts.discretizer)
         slopes = np.stack([derivative @ velocity for derivative in gradient])  # (2, N, 2): ∂/∂x and ∂/∂y of u, v
         force = _force(parts, flow, velocity, change, slopes)
         claims["audit.moment"] = _moment(parts, flow, velocity, force)
@@ -296,7 +295,7 @@ def _resolution(flow: Flow, velocity: Array, slopes: Array) -> float:
     inside is below 2 %, above 0.5 where it is above 9 %. A wrong velocity that is smooth goes unnoticed.
     """
     nodes = flow.cloud.nodes
-    near = scipy.spatial.cKDTree(nodes).query(nodes, min(NEIGHBOURS + 1, len(nodes)))[1][:, 1:]
+    near = flow.cloud.tree.query(nodes, min(NEIGHBOURS + 1, len(nodes)))[1][:, 1:]
     i, j = np.repeat(np.arange(len(nodes)), near.shape[1]), near.ravel()
     inner = ~(flow.cloud.on_boundary[i] | flow.cloud.on_boundary[j])
     i, j = i[inner], j[inner]

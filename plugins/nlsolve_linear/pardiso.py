@@ -176,9 +176,9 @@ def _kinds(diagonal: np.ndarray, symmetric: bool, earlier: _Analysed | None) -> 
 
 
 class Pardiso(LinearSolver):
-    """LU with pivots within supernodes, scaled and matched where it is not exact without; for a symmetric matrix LLᵀ, or
-    LDLᵀ where it is not positive definite, at half the entries. Ordered by minimum degree, or by dissection where there
-    are many entries.
+    """LU with pivots within supernodes, scaled and matched where it is not exact without; for a symmetric matrix LLᵀ,
+    or LDLᵀ where it is not positive definite, at half the entries. Ordered by minimum degree, or by dissection where
+    there are many entries.
 
     Its factors give no condition: PARDISO must analyse anew before it solves with the transposed matrix.
     """

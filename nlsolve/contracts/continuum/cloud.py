@@ -11,7 +11,7 @@ import scipy
 from numpy.typing import NDArray
 
 from nlsolve.contracts.continuum.near import Near
-from nlsolve.contracts.continuum.triangulation import found, kept
+from nlsolve.contracts.continuum.triangulation import edges_of, found, kept, spacings
 from nlsolve.contracts.status import SolveError, Status
 from nlsolve.series import Array, Indices
 
@@ -69,6 +69,11 @@ class Cloud:
         """
         before = self.triangles_before
         return found(self.nodes) if before is None else self.triangulated_from(before)
+
+    @cached_property
+    def spacing(self) -> Array:
+        """The median length of the edges that meet at each node, shape (N,) [mm]; infinite where none does."""
+        return spacings(self.nodes, edges_of(self.triangulation))
 
     def triangulated_from(self, corners: Indices) -> Indices:
         """Delaunay's triangulation (T, 3) by flips in another one; where these do not lead there it is found anew."""

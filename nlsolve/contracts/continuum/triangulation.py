@@ -47,6 +47,16 @@ def edges_of(corners: Indices) -> Indices:
     return np.stack(np.divmod(np.unique(side_keys(corners, count)), count), axis=1)
 
 
+def spacings(nodes: Array, edges: Indices) -> Array:
+    """The median length of the edges (E, 2) that meet at each node (N, 2), (N,); infinite where none does."""
+    lengths = np.linalg.norm(nodes[edges[:, 0]] - nodes[edges[:, 1]], axis=1)
+    ends, both = edges.T.ravel(), np.concatenate([lengths, lengths])
+    order = np.lexsort((both, ends))
+    counts = np.bincount(ends, minlength=len(nodes))
+    middle = np.cumsum(counts) - counts + (counts - 1) // 2
+    return np.where(counts > 0, both[order][np.minimum(middle, len(both) - 1)], np.inf)
+
+
 def subdivided(corners: Indices, edges: Indices, first: int) -> Indices:
     """The triangles (T, 3), cut from the middles of those of their sides that are among the `edges` (E, 2) to the other
     ones, or to the corner in front of them; the node in the middle of edge e has the number `first` + e.

@@ -9,7 +9,6 @@ from __future__ import annotations
 import numpy as np
 
 from nlsolve.contracts.continuum.cloud import Cloud
-from nlsolve.contracts.continuum.triangulation import edges_of
 from nlsolve.flow.claims.finding import NOTHING, Finding
 from nlsolve.series import Array, Indices
 
@@ -19,11 +18,11 @@ def largest_hole(cloud: Cloud) -> Finding:
 
     A triangle lies in the flow when a corner is an inner node; where all three are at walls it may lie outside.
     """
-    nodes, edges = cloud.nodes, edges_of(cloud.triangulation)
+    nodes = cloud.nodes
     corners = cloud.triangulation[~cloud.on_boundary[cloud.triangulation].all(axis=1)]
     centres = circumcentres(nodes[corners])
     radii = np.linalg.norm(nodes[corners[:, 0]] - centres, axis=1)
-    ratios = radii / spacings(nodes, edges)[corners].max(axis=1)
+    ratios = radii / cloud.spacing[corners].max(axis=1)
     largest = _first_within(centres, np.argsort(-ratios, kind="stable"), nodes[corners])
     if largest is None:
         return NOTHING
@@ -64,13 +63,3 @@ def circumcentres(corners: Array) -> Array:
         x = (sides[:, 1, 1] * squares[:, 0] - sides[:, 0, 1] * squares[:, 1]) / twice
         y = (sides[:, 0, 0] * squares[:, 1] - sides[:, 1, 0] * squares[:, 0]) / twice
     return first + np.stack([x, y], axis=1)
-
-
-def spacings(nodes: Array, edges: Indices) -> Array:
-    """The median length of the edges (E, 2) that meet at each node (N, 2), (N,); infinite where none does."""
-    lengths = np.linalg.norm(nodes[edges[:, 0]] - nodes[edges[:, 1]], axis=1)
-    ends, both = edges.T.ravel(), np.concatenate([lengths, lengths])
-    order = np.lexsort((both, ends))
-    counts = np.bincount(ends, minlength=len(nodes))
-    middle = np.cumsum(counts) - counts + (counts - 1) // 2
-    return np.where(counts > 0, both[order][np.minimum(middle, len(both) - 1)], np.inf)

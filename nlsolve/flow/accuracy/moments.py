@@ -19,8 +19,6 @@ import numpy as np
 import scipy
 
 from nlsolve.contracts.continuum.cloud import Cloud
-from nlsolve.contracts.continuum.triangulation import edges_of
-from nlsolve.flow.accuracy.holes import spacings
 from nlsolve.flow.claims.finding import NOTHING, Finding
 from nlsolve.series import Array
 
@@ -52,7 +50,7 @@ class Discs:
     @classmethod
     def within(cls, cloud: Cloud) -> Discs:
         """The largest discs around inner nodes first, each centre outside of those before it."""
-        spacing = spacings(cloud.nodes, edges_of(cloud.triangulation))[cloud.interior]
+        spacing = cloud.spacing[cloud.interior]
         nodes = cloud.nodes[cloud.interior]
         to_walls = scipy.spatial.cKDTree(cloud.nodes[cloud.boundary]).query(nodes)[0]
         radii = np.minimum(FROM_WALLS * to_walls, WIDEST * spacing)

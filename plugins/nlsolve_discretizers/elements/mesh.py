@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from nlsolve.plugin import Cloud, SolveError, Status, wall_edges, wall_middles
+from nlsolve.plugin import Cloud, SolveError, Status, subdivided, wall_edges, wall_middles
 from nlsolve_discretizers.elements import functions
 from nlsolve_discretizers.weights.assembly import Gradient
 from nlsolve_discretizers.weights.triangles import Triangles
@@ -57,7 +57,8 @@ class Mesh(Cloud):
         outer = (beside[:, 1] < 0) & cloud.on_boundary[ends].all(axis=1)
         elements = np.column_stack([triangles.corners, count + number(triangles.corners[:, functions.EDGES])])
         patch = _without_single_ones(triangles.patch, beside[beside[:, 1] >= 0])
-        return cls(np.concatenate([cloud.nodes, middles]), _with_middles(cloud, ends, outer), elements, patch)
+        nodes, groups = np.concatenate([cloud.nodes, middles]), _with_middles(cloud, ends, outer)
+        return cls(nodes, groups, elements, patch, triangles_before=subdivided(triangles.whole, ends, count))
 
     def samples(self, at: np.ndarray) -> Samples:
         """Places, sizes and gradients at points L (P, 3). Raises SolveError (bad cloud) if a triangle is turned inside

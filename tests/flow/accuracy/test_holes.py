@@ -14,8 +14,8 @@ from nlsolve_scenes import Cavity, Channel, Manufactured, StirringTool
 from nlsolve_scenes.nodes.rings import Rings
 
 from nlsolve.contracts.continuum.geometry import Geometry
-from nlsolve.contracts.continuum.triangulation import edges_of
-from nlsolve.flow.accuracy.holes import circumcentres, largest_hole, spacings
+from nlsolve.contracts.continuum.triangulation import edges_of, spacings
+from nlsolve.flow.accuracy.holes import circumcentres, largest_hole
 from nlsolve.flow.validity import LIMITS
 from nlsolve.plugin import Cloud, ConstitutiveLaw
 from nlsolve.series import Array
