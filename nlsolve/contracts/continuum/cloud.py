@@ -71,9 +71,14 @@ class Cloud:
         return found(self.nodes) if before is None else self.triangulated_from(before)
 
     @cached_property
+    def edges(self) -> Indices:
+        """The edges (E, 2) of the triangulation, each once, the smaller node first, in the order of their nodes."""
+        return edges_of(self.triangulation)
+
+    @cached_property
     def spacing(self) -> Array:
         """The median length of the edges that meet at each node, shape (N,) [mm]; infinite where none does."""
-        return spacings(self.nodes, edges_of(self.triangulation))
+        return spacings(self.nodes, self.edges)
 
     def triangulated_from(self, corners: Indices) -> Indices:
         """Delaunay's triangulation (T, 3) by flips in another one; where these do not lead there it is found anew."""

@@ -54,6 +54,16 @@ class PointOperators:
         weighed = sp.diags_array(_weights(areas, rate.shape[0] // len(points)))
         return cls(rate, (-(rate[:, free].T @ weighed)).tocsr(), points, areas)
 
+    def rate_of(self, unknowns: Indices) -> Any:
+        """The columns `unknowns` (2F,) of B, (c P, 2F): rates of what is zero elsewhere; kept."""
+        if not self._kept or not np.array_equal(self._kept[0], unknowns):
+            self._kept[:] = unknowns, self.rate[:, unknowns]
+        return self._kept[1]
+
+    @cached_property
+    def _kept(self) -> list[Any]:
+        return []
+
     def weights(self) -> Array:
         """The diagonal of A, (c P,) [mm²], xy counted twice; for points with areas only."""
         assert self.areas is not None

@@ -44,7 +44,8 @@ def ordered(corners: Indices) -> Indices:
 def edges_of(corners: Indices) -> Indices:
     """The edges (E, 2) of triangles (T, 3), each once, the smaller node first, in the order of their nodes."""
     count = int(corners.max(initial=0)) + 1
-    return np.stack(np.divmod(np.unique(side_keys(corners, count)), count), axis=1)
+    keys = np.sort(side_keys(corners, count))
+    return np.stack(np.divmod(keys[np.flatnonzero(np.diff(keys, prepend=-1))], count), axis=1)
 
 
 def spacings(nodes: Array, edges: Indices) -> Array:

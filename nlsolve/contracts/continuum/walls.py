@@ -11,6 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from nlsolve.contracts.continuum.cloud import Cloud
+from nlsolve.contracts.continuum.triangulation import side_keys
 from nlsolve.series import Array, Indices
 
 CORNER = float(np.cos(np.pi / 4.0))
@@ -27,11 +28,15 @@ def wall_edges(cloud: Cloud, corners: Indices) -> Indices:
     corners : of the Delaunay triangles of the cloud, (T, 3).
     """
     nothing = np.empty((0, 4), dtype=int)
-    in_group = np.array([np.isin(corners, group).all(axis=1) for group in cloud.boundaries.values()])
-    in_flow = corners[~in_group.reshape(len(in_group), len(corners)).any(axis=0)]
-    sides = np.sort(np.concatenate([in_flow[:, [0, 1]], in_flow[:, [1, 2]], in_flow[:, [2, 0]]]), axis=1)
-    edges, times = np.unique(sides, axis=0, return_counts=True)
-    edges = edges[(times == 1) & cloud.on_boundary[edges].all(axis=1)]
+    in_flow = np.ones(len(corners), dtype=bool)
+    for group in cloud.boundaries.values():
+        member = np.zeros(len(cloud.nodes), dtype=bool)
+        member[group] = True
+        in_flow &= ~member[corners].all(axis=1)
+    keys = np.sort(side_keys(corners[in_flow], len(cloud.nodes)))
+    new = np.append(np.diff(keys, prepend=-1) > 0, True)
+    edges = np.stack(np.divmod(keys[new[:-1] & new[1:]], len(cloud.nodes)), axis=1)
+    edges = edges[cloud.on_boundary[edges].all(axis=1)]
     if not (np.bincount(edges.ravel(), minlength=len(cloud.nodes)) == 2 * cloud.on_boundary).all():
         return nothing
     ends = np.concatenate([edges, edges[:, ::-1]])

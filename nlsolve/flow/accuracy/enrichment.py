@@ -12,7 +12,7 @@ import scipy
 import scipy.sparse as sp
 
 from nlsolve.contracts.continuum.cloud import Cloud
-from nlsolve.contracts.continuum.triangulation import edges_of, on_one_wall, subdivided
+from nlsolve.contracts.continuum.triangulation import on_one_wall, subdivided
 from nlsolve.contracts.continuum.walls import middles, wall_edges
 from nlsolve.series import Array, Indices
 
@@ -50,8 +50,7 @@ class Finer:
 
 def inner_edges(cloud: Cloud) -> Indices:
     """The edges of the Delaunay triangulation with a node inside, (E, 2). Across a hole both ends are at its wall."""
-    edges = edges_of(cloud.triangulation)
-    return edges[~cloud.on_boundary[edges].all(axis=1)]
+    return cloud.edges[~cloud.on_boundary[cloud.edges].all(axis=1)]
 
 
 def the_same(cloud: Cloud) -> Finer:

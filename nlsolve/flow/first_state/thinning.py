@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 
 from nlsolve.contracts.continuum.cloud import Cloud
-from nlsolve.contracts.continuum.triangulation import edges_of
 from nlsolve.series import Mask
 
 SEED = 0
@@ -27,7 +26,7 @@ def _independent(cloud: Cloud) -> Mask:
     """
     size = len(cloud.nodes)
     drawn = np.random.default_rng(SEED).permutation(size) + size * cloud.on_boundary
-    one, other = edges_of(cloud.triangulation).T
+    one, other = cloud.edges.T
     keep, undecided = np.zeros(size, dtype=bool), np.ones(size, dtype=bool)
     while undecided.any():
         largest = np.full(size, -1)

@@ -214,7 +214,7 @@ class Flow(NonlinearProblem):
     @cached_property
     def _strain(self) -> Any:
         """B at the interior nodes, (3M, 2F)."""
-        return self.operators.strain.rate[:, self._free]
+        return self.operators.strain.rate_of(self._free)
 
     @cached_property
     def _without_stress(self) -> Any:
@@ -223,7 +223,7 @@ class Flow(NonlinearProblem):
         if self._volumetric is None:
             return inertia
         assert self._modulus is not None
-        dilatation = sp.diags_array(-self._modulus) @ self._volumetric.rate[:, self._free]
+        dilatation = sp.diags_array(-self._modulus) @ self._volumetric.rate_of(self._free)
         volumetric = self._volumetric.force @ dilatation
         return volumetric if inertia is None else volumetric + inertia
 

@@ -10,7 +10,13 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 
 from nlsolve.plugin import Cloud
+from nlsolve_scenes.nodes.between_circles import between_circles
 from nlsolve_scenes.nodes.scatter import jittered, scatter
+
+MANY = 20_000
+"""Nodes on circles above which their triangles are known from the circles: beyond it Qhull takes twice the time a node,
+ten times that of the walk around. Four nodes on one circle may get another diagonal than from Qhull.
+"""
 
 
 class NodeSet(BaseModel):
@@ -181,6 +187,6 @@ def on_circle(radius: float, spacing: float | np.ndarray) -> np.ndarray:
 def on_rings(radii: np.ndarray, spacings: np.ndarray) -> Cloud:
     """Circles of radii (R,) with nodes at distances (R,); the first is the group "tool", the last "plate"."""
     circles = [on_circle(radius, h) for radius, h in zip(radii, spacings, strict=True)]
-    nodes = np.concatenate(circles)
-    tool, plate = len(circles[0]), len(circles[-1])
-    return Cloud(nodes, {"tool": np.arange(tool), "plate": np.arange(len(nodes) - plate, len(nodes))})
+    nodes, counts = np.concatenate(circles), np.array([len(circle) for circle in circles])
+    groups = {"tool": np.arange(counts[0]), "plate": np.arange(len(nodes) - counts[-1], len(nodes))}
+    return Cloud(nodes, groups, triangles_before=between_circles(counts) if len(nodes) > MANY else None)
