@@ -127,6 +127,20 @@ def test_a_penalty_presses_against_dilatation() -> None:
     assert (zero.residual(u) - without.residual(u)) @ u > 0.0
 
 
+def test_columns_of_the_rate_and_values_at_the_nodes_are_kept_for_what_they_were_made_for() -> None:
+    strain, free = OPERATORS["between"].strain, node_major(CLOUD.interior)
+    inside = strain.rate_of(free)
+    assert strain.rate_of(free.copy()) is inside
+    assert abs(inside - strain.rate[:, free]).max() == 0.0
+    assert abs(strain.rate_of(free[:4]) - strain.rate[:, free[:4]]).max() == 0.0
+    assert replace(strain, rate=2.0 * strain.rate).rate_of(free).sum() == pytest.approx(2.0 * inside.sum())
+    problem, other = flow("between", 0.5), MovingLeastSquares(support=14)
+    to_nodes = problem.to_nodes(FORMS["between"])
+    assert problem.to_nodes(MovingLeastSquares()) is to_nodes
+    assert abs(to_nodes - FORMS["between"].values(strain.points, CLOUD.nodes)).max() == 0.0
+    assert abs(problem.to_nodes(other) - to_nodes).max() > 0.0
+
+
 def test_a_linear_law_gives_a_linear_problem() -> None:
     problem = flow("between", 1.0)
     u = near(problem, 0.5)

@@ -11,7 +11,7 @@ import scipy
 from numpy.typing import NDArray
 
 from nlsolve.contracts.continuum.near import Near
-from nlsolve.contracts.continuum.triangulation import edges_of, found, kept, spacings
+from nlsolve.contracts.continuum.triangulation import doubled_areas, edges_of, found, kept, spacings
 from nlsolve.contracts.status import SolveError, Status
 from nlsolve.series import Array, Indices
 
@@ -31,18 +31,31 @@ class Cloud:
     triangles_before: Indices | None = field(default=None, repr=False, compare=False, kw_only=True)
     """Triangles (T, 3) of these nodes, from which a few flips of edges lead to Delaunay's."""
 
+    between: Indices | None = field(default=None, repr=False, compare=False, kw_only=True)
+    """The two nodes (E, 2) in the middle of which each of the last E nodes lies, on a wall on its curve."""
+
     def __post_init__(self) -> None:
         if not len(self.nodes):
             raise SolveError(Status.BAD_CLOUD, "there are no nodes")
         if not np.isfinite(self.nodes).all():
             bad = int(np.flatnonzero(~np.isfinite(self.nodes).all(axis=1))[0])
             raise SolveError(Status.BAD_CLOUD, f"node {bad} has a coordinate that is not a finite number")
+        if self._are_corners():
+            return
         spread = max(float(np.ptp(x)) for x in self.nodes.T)
         nearest = self.nearest_distance
         first = int(nearest.argmin())
         if not nearest[first] > 1e-9 * spread:
             x, y = self.nodes[first]
             raise SolveError(Status.BAD_CLOUD, f"two nodes coincide at ({x:.6g}, {y:.6g}): remove one of them")
+
+    def _are_corners(self) -> bool:
+        """Whether each node is the corner of a known triangle and all of these are upright, so that no two coincide."""
+        corners = self.triangles_before
+        if corners is None:
+            return False
+        once = np.bincount(corners.ravel(), minlength=len(self.nodes)) > 0
+        return bool(once.all() and (doubled_areas(*np.ascontiguousarray(self.nodes.T), *corners.T) > 0.0).all())
 
     @cached_property
     def nearest_distance(self) -> Array:
@@ -110,7 +123,7 @@ class Cloud:
 
     def moved_to(self, nodes: Array) -> Cloud:
         """A cloud with the same groups and other places `nodes` (N, 2) [mm]. Raises SolveError (bad cloud)."""
-        return replace(self, nodes=nodes, near_before=self.near, triangles_before=None)
+        return replace(self, nodes=nodes, near_before=self.near, triangles_before=None, between=None)
 
 
 @dataclass(frozen=True)

@@ -60,6 +60,8 @@ def the_same(cloud: Cloud) -> Finer:
 
 def completed(cloud: Cloud, coarser: Cloud) -> Finer:
     """A `cloud` whose first nodes are those of a `coarser` one."""
+    if cloud.between is not None and len(cloud.nodes) == len(coarser.nodes) + len(cloud.between):
+        return Finer(cloud, coarser, _with_means(cloud.between, len(coarser.nodes)))
     added = interpolation(coarser, cloud.nodes[len(coarser.nodes) :])
     return Finer(cloud, coarser, _after_its_own(added))
 
@@ -77,9 +79,16 @@ def twice_as_fine(cloud: Cloud) -> Finer:
     edges = np.concatenate([within, walls[named, 1:3]])
     places = np.concatenate([cloud.nodes[within].mean(axis=1), middles(cloud.nodes, walls[named])])
     nodes, triangles = np.concatenate([cloud.nodes, places]), subdivided(cloud.triangulation, edges, len(cloud.nodes))
-    means = sp.coo_array((np.full(edges.size, 0.5), (np.arange(edges.size) // 2, edges.ravel())))
-    means.resize(len(edges), len(cloud.nodes))
-    return Finer(Cloud(nodes, groups, triangles_before=triangles), cloud, _after_its_own(means))
+    finer = Cloud(nodes, groups, triangles_before=triangles, between=edges)
+    return Finer(finer, cloud, _with_means(edges, len(cloud.nodes)))
+
+
+def _with_means(between: Indices, nodes: int) -> Any:
+    """The weights of further nodes in the middle `between` two, (E, 2), of a cloud, below those of its own."""
+    starts = np.concatenate([np.arange(nodes), nodes + np.arange(0, between.size + 1, 2)])
+    places, shares = np.concatenate([np.arange(nodes), between.ravel()]), np.ones(nodes + between.size)
+    shares[nodes:] = 0.5
+    return sp.csr_array((shares, places, starts), shape=(nodes + len(between), nodes))
 
 
 def _after_its_own(added: Any) -> Any:

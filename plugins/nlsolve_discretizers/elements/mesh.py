@@ -58,7 +58,8 @@ class Mesh(Cloud):
         elements = np.column_stack([triangles.corners, count + number(triangles.corners[:, functions.EDGES])])
         patch = _without_single_ones(triangles.patch, beside[beside[:, 1] >= 0])
         nodes, groups = np.concatenate([cloud.nodes, middles]), _with_middles(cloud, ends, outer)
-        return cls(nodes, groups, elements, patch, triangles_before=subdivided(triangles.whole, ends, count))
+        before = subdivided(triangles.whole, ends, count)
+        return cls(nodes, groups, elements, patch, triangles_before=before, between=ends)
 
     def samples(self, at: np.ndarray) -> Samples:
         """Places, sizes and gradients at points L (P, 3). Raises SolveError (bad cloud) if a triangle is turned inside

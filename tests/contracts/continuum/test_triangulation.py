@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from nlsolve.contracts.continuum import triangulation
 from nlsolve.flow.accuracy.enrichment import twice_as_fine
 from nlsolve.flow.accuracy.holes import circumcentres
-from nlsolve.plugin import Cloud
+from nlsolve.plugin import Cloud, SolveError
 from nlsolve.series import Array, Indices
 
 
@@ -131,6 +131,21 @@ def test_a_cloud_twice_as_fine_is_triangulated_from_the_coarser_one(cloud: Cloud
     nearest = finer.tree.query(centres)[0]
     assert (nearest >= radii * (1.0 - 1e-9)).all()
     assert set(in_flow.ravel()) == set(range(len(finer.nodes)))
+
+
+@pytest.mark.parametrize("corners", [[[0, 1, 2], [0, 2, 3]], [[0, 1, 2]], [[0, 2, 1], [0, 2, 3]]])
+def test_known_triangles_excuse_no_node_that_none_of_them_has(corners: list[list[int]]) -> None:
+    """Node 4 lies where node 2 does; the triangles of the first four nodes are all upright, or one is not."""
+    nodes = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0], [1.0, 1.0]])
+    with pytest.raises(SolveError, match=r"two nodes coincide at \(1, 1\)"):
+        Cloud(nodes, {}, triangles_before=np.array(corners))
+
+
+def test_the_spacing_at_a_node_is_the_median_length_of_its_edges() -> None:
+    nodes = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 2.0], [-4.0, -4.0]])
+    assert Cloud(nodes, {}).edges.tolist() == [[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]]
+    lengths = np.linalg.norm(nodes[[1, 2, 3]] - nodes[0], axis=1)
+    assert Cloud(nodes, {}).spacing[0] == np.median(lengths)
 
 
 def test_a_moved_cloud_forgets_triangles_of_another_place() -> None:

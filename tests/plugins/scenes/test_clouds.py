@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -10,10 +11,13 @@ import meshio
 import numpy as np
 import pytest
 from cases import setup
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from nlsolve_laws import Bingham, CarreauYasuda, HerschelBulkley, NortonHoff, PowerLaw
 from nlsolve_linear.superlu import SuperLU
 from nlsolve_scenes import Channel, Couette, StirringTool
-from nlsolve_scenes.nodes import files, fronts
+from nlsolve_scenes.nodes import files, fronts, rings
+from nlsolve_scenes.nodes.between_circles import between_circles
 from nlsolve_scenes.nodes.files import NodeFile
 from nlsolve_scenes.nodes.rectangle import sides
 from nlsolve_scenes.nodes.rings import Auto, GradedRings, Rings, Scattered
@@ -23,8 +27,9 @@ from scipy.integrate import trapezoid
 from scipy.spatial import Delaunay, Voronoi, cKDTree
 
 from nlsolve import SolveError, Status
+from nlsolve.flow.accuracy.holes import circumcentres
 from nlsolve.flow.continuation import Start
-from nlsolve.plugin import Cloud, ConstitutiveLaw, FlowScene
+from nlsolve.plugin import Cloud, ConstitutiveLaw, FlowScene, doubled_areas, on_one_wall
 from nlsolve.series import Array
 from nlsolve.solving.simulate import run_case as march
 from nlsolve.testing import check_scene
@@ -144,6 +149,46 @@ def test_jitter_stays_below_half(nodes: str, jitter: float) -> None:
 
 
 # A hundred radii.
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.lists(st.integers(6, 40), min_size=1, max_size=6))
+def test_a_walk_around_the_gaps_fills_them_with_upright_triangles(counts: list[int]) -> None:
+    radii = 1.0 + 0.3 * np.arange(len(counts))
+    nodes = np.concatenate([r * ring(count) for r, count in zip(radii, counts, strict=True)])
+    corners = between_circles(np.array(counts))
+    areas = 0.5 * doubled_areas(*nodes.T, *corners.T)
+    if len(counts) < 2 or min(counts) >= 24:  # a wide side of a circle may cut the next one
+        assert (areas > 0.0).all()
+    assert areas.sum() == pytest.approx(0.5 * counts[-1] * radii[-1] ** 2 * np.sin(2.0 * np.pi / counts[-1]))
+    assert len(corners) == counts[0] - 2 + sum(one + other for one, other in pairwise(counts))
+    assert len(np.unique(np.sort(corners, axis=1), axis=0)) == len(corners)
+
+
+def ring(count: int) -> Array:
+    """Nodes (count, 2) at equal angles on the unit circle."""
+    angle = 2.0 * np.pi / count * np.arange(count)
+    return np.stack([np.cos(angle), np.sin(angle)], axis=1)
+
+
+@pytest.mark.parametrize("nodes", [Rings(), GradedRings(), GradedRings(first=0.02, growth=0.3, spacing=0.5)])
+def test_many_nodes_on_circles_are_triangulated_as_few_are_but_for_ties(
+    nodes: Rings | GradedRings, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The circle of every triangle of the one is empty, as that of the other is."""
+    found = nodes.cloud(1.5, 6.0)
+    monkeypatch.setattr(rings, "MANY", 100)
+    walked = nodes.cloud(1.5, 6.0)
+    assert found.triangles_before is None
+    assert walked.triangles_before is not None
+    assert len(walked.triangulation) == len(found.triangulation)
+    corners = walked.triangulation[~on_one_wall(walked.walls[walked.triangulation.T])]
+    centres = circumcentres(walked.nodes[corners])
+    radii = np.linalg.norm(walked.nodes[corners[:, 0]] - centres, axis=1)
+    nearest = cKDTree(walked.nodes).query(centres)[0]
+    np.testing.assert_allclose(nearest, radii, rtol=1e-8)
+    other = [frozenset(map(int, three)) for three in found.triangulation]
+    assert len({frozenset(map(int, three)) for three in corners} - set(other)) < 0.01 * len(corners)
 
 
 def test_graded_rings_reach_a_hundred_radii() -> None:
