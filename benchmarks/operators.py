@@ -15,6 +15,7 @@ from __future__ import annotations
 import sys
 import time
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -59,8 +60,10 @@ def preparation(discretizer: Any, cloud: Cloud) -> None:
 
 
 def anew(cloud: Cloud) -> Cloud:
-    """The same nodes, of which nothing has been found yet: a cloud keeps its triangulation."""
-    return Cloud(cloud.nodes, cloud.boundaries)
+    """The same nodes, of which nothing has been found yet: a cloud keeps its triangulation. What the scene has told of
+    their triangles stays.
+    """
+    return replace(cloud)
 
 
 def stirred(case: Any, increments: int) -> Iterator[Cloud]:
