@@ -54,8 +54,8 @@ class Cloud:
         corners = self.triangles_before
         if corners is None:
             return False
-        once = np.bincount(corners.ravel(), minlength=len(self.nodes)) > 0
-        return bool(once.all() and (doubled_areas(*np.ascontiguousarray(self.nodes.T), *corners.T) > 0.0).all())
+        all_are = (np.bincount(corners.ravel(), minlength=len(self.nodes)) > 0).all()
+        return bool(all_are and (doubled_areas(*np.ascontiguousarray(self.nodes.T), *corners.T) > 0.0).all())
 
     @cached_property
     def nearest_distance(self) -> Array:

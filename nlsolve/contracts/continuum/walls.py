@@ -35,7 +35,8 @@ def wall_edges(cloud: Cloud, corners: Indices) -> Indices:
         in_flow &= ~member[corners].all(axis=1)
     keys = np.sort(side_keys(corners[in_flow], len(cloud.nodes)))
     new = np.append(np.diff(keys, prepend=-1) > 0, True)
-    edges = np.stack(np.divmod(keys[new[:-1] & new[1:]], len(cloud.nodes)), axis=1)
+    alone = keys[new[:-1] & new[1:]]  # unlike the one before and the one behind it
+    edges = np.stack(np.divmod(alone, len(cloud.nodes)), axis=1)
     edges = edges[cloud.on_boundary[edges].all(axis=1)]
     if not (np.bincount(edges.ravel(), minlength=len(cloud.nodes)) == 2 * cloud.on_boundary).all():
         return nothing

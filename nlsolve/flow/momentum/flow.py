@@ -105,7 +105,7 @@ class Flow(NonlinearProblem):
             constant -= areas * body_force.ravel()
         self._constant = constant
         self._known: tuple[Array, tuple[Array, Array | None]] | None = None
-        self._to_nodes: dict[Discretizer, Any] = {}
+        self._to_nodes: tuple[Discretizer, Any] | None = None
 
     def residual(self, u: Array) -> Array:
         """R(u), (2F,)."""
@@ -267,13 +267,13 @@ class Flow(NonlinearProblem):
         return PointRates(self.strain_rate(u), self.dilatation_rate(u))
 
     def to_nodes(self, discretizer: Discretizer) -> Any:
-        """Values at the strain points -> at the nodes as the discretizer takes them there, sparse (N, M), kept.
+        """Values at the strain points -> at the nodes as the discretizer takes them there, sparse (N, M); kept.
 
         Raises SolveError (bad cloud) where the points around a node do not determine them.
         """
-        if discretizer not in self._to_nodes:
-            self._to_nodes[discretizer] = discretizer.values(self.operators.strain.points, self.cloud.nodes)
-        return self._to_nodes[discretizer]
+        if self._to_nodes is None or self._to_nodes[0] != discretizer:
+            self._to_nodes = discretizer, discretizer.values(self.operators.strain.points, self.cloud.nodes)
+        return self._to_nodes[1]
 
     def stress_at_points(self, u: Array) -> Array:
         """s at the evaluation points, shape (3, M) [MPa]."""
