@@ -13,11 +13,6 @@ from nlsolve.plugin import Cloud
 from nlsolve_scenes.nodes.between_circles import between_circles
 from nlsolve_scenes.nodes.scatter import jittered, scatter
 
-MANY = 20_000
-"""Nodes on circles above which their triangles are known from the circles: beyond it Qhull takes twice the time a node,
-ten times that of the walk around. Four nodes on one circle may get another diagonal than from Qhull.
-"""
-
 
 class NodeSet(BaseModel):
     """The fields that all node sets have. Equal fields give equal nodes."""
@@ -51,6 +46,7 @@ class Rings(AnnulusSet):
     def regular(self, inner: float, outer: float) -> Cloud:
         """Rings at distances of h, or a little more or less so that the last one lies on the wall."""
         count = max(1, round((outer - inner) / self.spacing))
+        # Not walked: where four nodes are on one circle, all tables of the paper's nodes were printed with Qhull's choice.
         return on_rings(np.linspace(inner, outer, count + 1), np.full(count + 1, self.spacing))
 
 
@@ -88,7 +84,7 @@ class GradedRings(GradedSet):
         while radii[-1] < outer:
             radii.append(radii[-1] + float(self.local_spacing(np.array(radii[-1]), inner)))
         stretched = inner + (np.array(radii) - inner) * (outer - inner) / (radii[-1] - inner)
-        return on_rings(stretched, self.local_spacing(stretched, inner))
+        return on_rings(stretched, self.local_spacing(stretched, inner), walked=True)
 
 
 class Scattered(GradedSet):
@@ -184,9 +180,12 @@ def on_circle(radius: float, spacing: float | np.ndarray) -> np.ndarray:
     return radius * np.stack([np.cos(angle), np.sin(angle)], axis=1)
 
 
-def on_rings(radii: np.ndarray, spacings: np.ndarray) -> Cloud:
-    """Circles of radii (R,) with nodes at distances (R,); the first is the group "tool", the last "plate"."""
+def on_rings(radii: np.ndarray, spacings: np.ndarray, walked: bool = False) -> Cloud:
+    """Circles of radii (R,) with nodes at distances (R,); the first is the group "tool", the last "plate".
+
+    walked : whether the cloud is told the triangles of a walk around the gaps, which takes a tenth of Qhull's time.
+    """
     circles = [on_circle(radius, h) for radius, h in zip(radii, spacings, strict=True)]
     nodes, counts = np.concatenate(circles), np.array([len(circle) for circle in circles])
     groups = {"tool": np.arange(counts[0]), "plate": np.arange(len(nodes) - counts[-1], len(nodes))}
-    return Cloud(nodes, groups, triangles_before=between_circles(counts) if len(nodes) > MANY else None)
+    return Cloud(nodes, groups, triangles_before=between_circles(counts) if walked else None)
