@@ -46,7 +46,7 @@ class Rings(AnnulusSet):
     def regular(self, inner: float, outer: float) -> Cloud:
         """Rings at distances of h, or a little more or less so that the last one lies on the wall."""
         count = max(1, round((outer - inner) / self.spacing))
-        # Not walked: where four nodes are on one circle, all tables of the paper's nodes were printed with Qhull's choice.
+        # Not walked: where four nodes are on one circle all tables of these nodes were printed with Qhull's choice.
         return on_rings(np.linspace(inner, outer, count + 1), np.full(count + 1, self.spacing))
 
 
