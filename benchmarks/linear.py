@@ -1,11 +1,14 @@
 """What linear solvers cost on the tangents of flows: factors, solves, their ratio, and how exact they are.
 
-    python benchmarks/linear.py [--large] [repeats]
+    python benchmarks/linear.py [--large | --orderings] [repeats]
 
 Prints, for every form of the discretisation on the 2015 paper's 1780 nodes (--large: also on 4854 and on 19133), a row
 for each linear solver: processor time [ms] of the first factorisation; the median of a later one, to which the first
 lends its ordering or analysis, and of one solve; both over SuperLU's in the same run; the pairs of triangular solves in
 a solve; entries of the factors; ‖b − A x‖/‖b‖. A linear solver whose library is absent is left out, and named.
+
+With --orderings: on rings 0.5 to 0.05 mm apart, what PARDISO takes when it orders by minimum degree over what it takes
+with a dissection by METIS, for a matrix of a new pattern, one of a known pattern, and a solve; and the same of entries.
 """
 
 from __future__ import annotations
@@ -18,6 +21,7 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
+from nlsolve_linear import pardiso
 from operators import setup
 from threadpoolctl import threadpool_limits
 
@@ -42,8 +46,10 @@ LINEARS: dict[str, dict[str, Any]] = {
     "lapack": {"kind": "lapack"},
 }
 SPACINGS = {"small": (0.25,), "large": (0.25, 0.15, 0.075)}  # of the rings [mm]
+ORDERED = (0.5, 0.25, 0.15, 0.1, 0.075, 0.05)
 DENSE = 4000  # unknowns up to which dense factors are tried
 OUT_OF = ["factor", "solve"]
+ALL, NONE = 10**12, 0  # entries up to which PARDISO orders by minimum degree
 
 
 def tangents(form: dict[str, Any], spacing: float) -> tuple[Any, Any]:
@@ -111,10 +117,31 @@ def measure(spacing: float, repeats: int) -> pd.DataFrame:
     return frame
 
 
+def orderings(repeats: int) -> pd.DataFrame:
+    """One row for each form and spacing: times and entries by minimum degree over those by dissection."""
+    rows: list[dict[str, Any]] = []
+    few = pardiso.FEW
+    for form, fields in FORMS.items():
+        for spacing in ORDERED:
+            first, following = tangents(fields, spacing)
+            found = []
+            for pardiso.FEW in (ALL, NONE):
+                costs = row(pardiso.Pardiso(), first, following, repeats)
+                new = [processor_time(lambda m=first: pardiso.Pardiso().factorize(m), 1)[1] for _ in range(repeats)]
+                found.append({"new": statistics.median(new), **costs})
+            ratios = {name: found[0][name] / found[1][name] for name in ("new", "factor", "solve", "fill")}
+            rows.append({"form": form, "unknowns": first.shape[0], "entries": first.nnz, **ratios})
+    pardiso.FEW = few
+    return pd.DataFrame(rows)
+
+
 def main(arguments: list[str]) -> None:
     """Print one table for each spacing."""
     size = "large" if "--large" in arguments else "small"
     numbers = [int(argument) for argument in arguments if argument.isdigit()]
+    if "--orderings" in arguments:
+        print(orderings(numbers[0] if numbers else 5).to_string(index=False, float_format="{:.2f}".format))
+        return
     for kind in sorted({chosen["kind"] for chosen in LINEARS.values()}):
         if complaint := load_registry().complaint("linear", kind):
             print(f"left out: {complaint}")
