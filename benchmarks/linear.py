@@ -139,7 +139,7 @@ def main(arguments: list[str]) -> None:
     """Print one table for each spacing."""
     size = "large" if "--large" in arguments else "small"
     numbers = [int(argument) for argument in arguments if argument.isdigit()]
-    if "--orderings" in arguments:
+    if "--orderings" in arguments and pardiso.Pardiso.absent is None:
         print(orderings(numbers[0] if numbers else 5).to_string(index=False, float_format="{:.2f}".format))
         return
     for kind in sorted({chosen["kind"] for chosen in LINEARS.values()}):

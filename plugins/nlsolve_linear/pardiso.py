@@ -45,9 +45,9 @@ MINIMUM_DEGREE, DISSECTION = (0, "minimum degree"), (2, "metis")
 """Orderings, with their names."""
 
 FEW = 450_000
-"""Entries of a matrix up to which factors of a new pattern take 0.4 to 0.9 of the time that they take with a dissection
-by METIS when they are ordered by minimum degree, and have as many entries within 12 %. Chosen on graded rings, judged on
-even ones (`benchmarks/linear.py --orderings`).
+"""Entries of a matrix up to which minimum degree serves: factors of a new pattern take 0.4 to 0.9 of their time with a
+dissection by METIS, and have as many entries within 12 %. Chosen on graded rings, judged on even ones
+(`benchmarks/linear.py --orderings`).
 """
 
 ACCURATE = {LU: 1e-12, MATCHED_LU: 1e-9, LDLT: 1e-9, LLT: 1e-9}
