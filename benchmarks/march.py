@@ -14,6 +14,7 @@ import sys
 import time
 from typing import Any
 
+import scipy.linalg  # noqa: F401  loads its BLAS, so that its threads are limited too
 from threadpoolctl import threadpool_limits
 
 import nlsolve
